@@ -54,6 +54,19 @@ SILENT_CONTROL = ControlTable(
     parameter='control_word', disable=0x0000, enable=0x0001, quick_stop=0x0002,
     reset_fault=0x0080)
 
+#: a TeSys T: its registers, and its control word
+TESYS_STATUS = parameter('system_status_1', 455, access=RO)
+TESYS_WORD = parameter('control_register_1', 704, storage=RAM)
+TESYS_SPEED = parameter('speed', 710, storage=RAM, scale=0.1, unit='Hz')
+TESYS = (TESYS_STATUS, TESYS_WORD, TESYS_SPEED)
+TESYS_CONTROL = ControlTable(
+    parameter='control_register_1', disable=0, enable=1, reset_fault=8,
+    status_parameter='system_status_1', ready=StatusPattern(1, 1),
+    enabled=StatusPattern(0x80, 0x80), fault=StatusPattern(4, 4))
+#: 60FFh of CiA 402
+TARGET_VELOCITY = parameter('target_velocity', None, index=0x60FF, subindex=0, type=INT32,
+                            scale=0.1, unit='rpm')
+
 #: drive keys that are not fields of a family
 _DRIVE_KEYS = set(DriveConfiguration.__dataclass_fields__)
 

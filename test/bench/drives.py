@@ -8,6 +8,7 @@ all, is the test's business. The simulated drives of the package know more, and 
 ``registers`` is number -> raw value; what is not in it the drive does not have.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 from drive_can_bridge.core.frame import Frame
@@ -19,6 +20,63 @@ class Registers(dict[int, int]):
     def update(self, entries: Any = (), **_: int) -> None:
         for number, raw in entries:
             self[number] = raw
+
+
+class Motor(Registers):
+    """
+    The registers of a drive, and the motor that obeys them.
+
+    Whatever tells it to run starts it, at once and however often that was said before, unless it
+    is at fault.
+
+    :param rest: what else the drive has.
+    :param word: number of what runs it while it holds 1; None: the setpoint alone moves it.
+    :param status: number of its status word, and ``bits`` of that: ready, enabled and fault.
+    :param moved: called behind a frame with whether that has started it, and whether it has given
+        another setpoint to one that runs, if either.
+    :ivar initial: what the drive holds at first.
+    """
+
+    def __init__(self, rest: dict[int, int] | None = None, *, setpoint: int = 50,
+                 word: int | None = 52, status: int = 211, bits: tuple[int, int, int] = (1, 2, 8),
+                 moved: Callable[[bool, bool], object] = lambda begins, moves: None) -> None:
+        super().__init__({setpoint: 0, status: 0, **({} if word is None else {word: 0}),
+                          **(rest or {})})
+        self.setpoint, self.word, self.status, self.bits = setpoint, word, status, bits
+        self.moved = moved
+        self.initial = dict(self)
+        self.runs = self.faulty = False
+        self.before = (False, 0)
+
+    def look(self) -> None:
+        """See what a frame, taken as a whole, has moved."""
+        now = self.runs, self[self.setpoint] if self.runs else 0
+        before, self.before = self.before, now
+        begins, moves = now[0] and not before[0], now[1] not in (0, before[1])
+        if begins or moves:
+            self.moved(begins, moves)
+
+    def stops(self, *, faulty: bool = False) -> None:
+        """Be stopped by something else than the bridge."""
+        self.runs, self.faulty, self.before = False, faulty, (False, 0)
+
+    def restarts(self, preset: int = 0) -> None:
+        """Be without power for a moment: nothing but the maps is kept."""
+        if self.word is not None:
+            self[self.word] = 0
+        self[self.setpoint] = preset
+        self.stops()
+
+    def __setitem__(self, number: int, raw: int) -> None:
+        super().__setitem__(number, raw)
+        if number == (self.setpoint if self.word is None else self.word):
+            self.runs = not self.faulty and (raw != 0 if self.word is None else raw == 1)
+
+    def __getitem__(self, number: int) -> int:
+        if number == self.status:
+            ready, enabled, fault = self.bits
+            return fault if self.faulty else ready | enabled * self.runs
+        return super().__getitem__(number)
 
 
 class ExtendedDrive:
@@ -66,6 +124,50 @@ class StandardDrive:
             return []
         answer = b''.join(self.registers[entry].to_bytes(2, 'little') for entry in numbers)
         return [Frame(sent.identifier + 0x400, answer.ljust(8, b'\xA5'), False)]
+
+
+class CannordDrive:
+    """
+    CANnord: 047Fh runs it and bit 7 acknowledges, by its own identifier and by broadcasts.
+
+    Register 52 holds 1 while it shall run, 50 and 51 are its setpoints, 209 and 210 its actual
+    values. A broadcast is not answered.
+
+    :ivar obeys: the identifiers of what tells it something.
+    """
+
+    def __init__(self, station: int, motor: Motor, *broadcasts: int) -> None:
+        self.registers, self.alone = motor, 2 * station
+        self.obeys: tuple[int, ...] = (self.alone, *broadcasts)
+
+    def takes(self, sent: Frame) -> list[Frame]:
+        identifier, data, _ = sent
+        if identifier == 0x200 + self.alone:
+            return self._parameter(data)
+        if identifier not in self.obeys:
+            return []
+        word, *setpoints = (int.from_bytes(data[place:place + 2], 'little')
+                            for place in range(0, len(data), 2))
+        motor = self.registers
+        motor.faulty = motor.faulty and not word & 0x80
+        motor.update([*zip((50, 51), setpoints), (52, int(word == 0x047F))])
+        if identifier != self.alone:
+            return []
+        words = (0x0B38 if motor.faulty else 0x0B37 if motor.runs else 0x0B31,
+                 motor.get(209, 0), motor.get(210, 0), 0)
+        return [Frame(identifier + 1, b''.join(
+            each.to_bytes(2, 'little') for each in words)[:len(data)], False)]
+
+    def _parameter(self, data: bytes) -> list[Frame]:
+        key = int.from_bytes(data[:2], 'little')
+        task, number = key >> 12, key & 0x7FF
+        if number not in self.registers:
+            return []
+        if task != 1:
+            assert task in (2, 14)
+            self.registers[number] = int.from_bytes(data[6:], 'little')
+        return [Frame(0x201 + self.alone, (1 << 12 | number).to_bytes(2, 'little') + bytes(4)
+                      + self.registers[number].to_bytes(2, 'little'), False)]
 
 
 class PkwNode:
@@ -324,3 +426,44 @@ class ServoDrive:
             self.becomes(self.ENABLED if state == self.ON else self.ON)
         else:
             self.becomes(state)     # what has changed of the power shows
+
+
+class MotorServo(ServoDrive):
+    """
+    CiA 402 with a motor: it runs while operation is enabled, and its setpoint is 60FFh.
+
+    What stops the motor, or makes it trip, is the drive's state with the next frame.
+    """
+
+    def __init__(self, node: int, motor: Motor,
+                 objects: dict[tuple[int, int], bytes] | None = None) -> None:
+        self.registers = motor
+        super().__init__(node, {(0x60FF, 0): bytes(4), **{
+            (index, subindex): bytes.fromhex(content) for index, subindex, content in (
+                (0x1400, 2, '01'), (0x1600, 0, '02'), (0x1600, 1, '10004060'),
+                (0x1600, 2, '2000FF60'), (0x1800, 2, '01'), (0x1800, 3, '0000'),
+                (0x1800, 5, '0000'), (0x1A00, 0, '01'), (0x1A00, 1, '10004160'))},
+            **(objects or {})})
+
+    def takes(self, sent: Frame) -> list[Frame]:
+        motor = self.registers
+        if motor.faulty is not (self.state == self.FAULT):
+            self.becomes(self.FAULT if motor.faulty else self.OFF)
+        elif self.state == self.ENABLED and not motor.runs:
+            self.becomes(self.OFF)      # by hand
+        if not self.stopped and str(sent).startswith(f'{0x600 + self.node:03X}#40416000'):
+            self.runs_down()    # while it is asked for its state, as while it is cycled
+        answers = super().takes(sent)
+        if self.operational and sent.identifier == 0x200 + self.node and (
+                by_event := self.responses(255)):   # as its event timer would
+            answers += by_event
+            self.runs_down()
+        motor[50] = self.number(0x60FF)
+        motor.faulty = self.state == self.FAULT
+        motor[52] = int(self.state == self.ENABLED)
+        return answers
+
+    def restarts(self) -> list[Frame]:
+        answers = super().restarts()
+        self.objects[0x60FF, 0] = self.registers[50].to_bytes(4, 'little')
+        return answers

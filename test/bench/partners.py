@@ -8,7 +8,9 @@ from typing import Any
 
 from builders import ACTUAL, CURRENT, drive, frame, read, SPEED, STATUS, TABLE, write
 from conversation import Conversation
-from drives import ExtendedDrive, PkwNode, ServoDrive, StandardDrive
+from drives import (
+    CannordDrive, ExtendedDrive, Motor, PkwNode, ServoDrive, StandardDrive,
+)
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
@@ -37,7 +39,7 @@ class Partner(ABC):
     idle = DriveState.NOT_ARMED
     words: Mapping[str, int] = {}
 
-    device: ExtendedDrive | StandardDrive | PkwNode | ServoDrive
+    device: CannordDrive | ExtendedDrive | StandardDrive | PkwNode | ServoDrive
 
     def __init__(self, **options: Any) -> None:
         self.configuration = self.configure(**options)
@@ -160,6 +162,11 @@ class CannordPartner(Partner):
     idle = DriveState.DISABLED
     words = {'disable': 0x047E, 'enable': 0x047F}
 
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.registers = Motor(self.registers)
+        self.device = CannordDrive(1, self.registers)
+
     def enable(self) -> None:
         self.deliver(self.talk.asks(ControlAction.ENABLE, self.now))
         self.live(max(0.1, 2 * self.configuration.period))
@@ -168,26 +175,6 @@ class CannordPartner(Partner):
     def configure(self, **options: Any) -> DriveConfiguration:
         options.setdefault('request', (SPEED,))
         return drive('cannord', response=(ACTUAL, CURRENT), **options)
-
-    def answers(self, sent: str) -> list[str]:
-        identifier, _, text = sent.partition('#')
-        data = bytes.fromhex(text)
-        if identifier == '002':
-            status = 0x0B37 if text.startswith('7F04') else 0x0B31
-            self.registers[50] = int.from_bytes(data[2:4], 'little')
-            self.registers[51] = int.from_bytes(data[4:6], 'little')
-            words = (status, self.registers[209], self.registers[210], 0)
-            return ['003#' + b''.join(word.to_bytes(2, 'little') for word in words).hex()]
-        assert identifier == '202'
-        key = int.from_bytes(data[:2], 'little')
-        task, number = key >> 12, key & 0x7FF
-        if number not in self.registers:
-            return []
-        if task != 1:
-            assert task in (2, 14)
-            self.registers[number] = int.from_bytes(data[6:], 'little')
-        value = self.registers[number].to_bytes(2, 'little')
-        return ['203#' + ((1 << 12 | number).to_bytes(2, 'little') + bytes(4) + value).hex()]
 
     def setpoints(self, sent: str) -> list[int]:
         if not sent.startswith('002#'):

@@ -38,16 +38,18 @@ import time
 from typing import Any
 
 from builders import (
-    ACTUAL, CONTROL, CURRENT, drive, frame, INT16, INT32, parameter, RAM, RO, SPEED, STATUS, WORD,
+    ACTUAL, CONTROL, CURRENT, drive, frame, INT16, parameter, SPEED, STATUS, TARGET_VELOCITY,
+    TESYS, TESYS_CONTROL, TESYS_SPEED, TESYS_STATUS, TESYS_WORD, WORD,
 )
-from drives import ExtendedDrive, PkwNode, ServoDrive, StandardDrive
+from drives import (
+    CannordDrive, ExtendedDrive, Motor, MotorServo, PkwNode, ServoDrive, StandardDrive,
+)
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import Noted, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.protocols.families import make_sessions
 
 PERIOD = 0.05
@@ -67,108 +69,10 @@ COMMAND_TIMEOUT = 0.5
 #: raw and physical value of the setpoint that users want, and how often they say so (s)
 RAW, VALUE, COMMANDED_EVERY = 50, 5.0, 0.1
 
-TESYS_STATUS = parameter('system_status_1', 455, access=RO)
-TESYS_WORD = parameter('control_register_1', 704, storage=RAM)
-TESYS_SPEED = parameter('speed', 710, storage=RAM, scale=0.1, unit='Hz')
-TESYS_CONTROL = ControlTable(
-    parameter='control_register_1', disable=0, enable=1, reset_fault=8,
-    status_parameter='system_status_1', ready=StatusPattern(1, 1),
-    enabled=StatusPattern(0x80, 0x80), fault=StatusPattern(4, 4))
-TARGET = parameter('target_velocity', None, index=0x60FF, subindex=0, type=INT32, scale=0.1,
-                   unit='rpm')
 FREQUENCY = parameter('frequency_setpoint', None, type=INT16, scale=0.1, unit='Hz')
 
 
-class Motor(dict[int, int]):
-    """
-    The registers of a drive, and the motor that obeys them.
-
-    :param word: number of the control word; None: the setpoint alone moves it.
-    :param status: number of the status word, and its bits for ready and enabled.
-    :param moved: called when it begins to run, or gets another setpoint while it runs.
-    """
-
-    def __init__(self, rest: dict[int, int], *, setpoint: int, word: int | None,
-                 status: int | None = None, bits: tuple[int, int] = (1, 2),
-                 moved: Callable[[bool], None]) -> None:
-        super().__init__(rest)
-        self.setpoint, self.word, self.status, self.bits = setpoint, word, status, bits
-        self.moved = moved
-        self.initial = dict(rest)
-        self.before = (False, 0)
-        self.restarts()
-
-    @property
-    def runs(self) -> bool:
-        return self[self.setpoint] != 0 if self.word is None else self[self.word] == 1
-
-    def look(self) -> None:
-        """Tell what a frame, taken as a whole, has moved."""
-        now = self.runs, self[self.setpoint] if self.runs else 0
-        before, self.before = self.before, now
-        moves = now[1] not in (0, before[1])
-        if now[0] and (moves or not before[0]):
-            self.moved(moves)
-
-    def restarts(self) -> None:
-        """Be without power for a moment: nothing but the maps is kept."""
-        for number in {self.setpoint, self.word} - {None}:
-            self[number] = 0    # type: ignore[index]
-        self.before = (False, 0)
-
-    def __getitem__(self, number: int) -> int:
-        if number == self.status:
-            ready, enabled = self.bits
-            return ready | enabled * self.runs
-        return super().__getitem__(number)
-
-
-class Inverter:
-    """CANnord: 7F04 runs it; obeys its own identifier, and those of broadcasts."""
-
-    def __init__(self, motor: Motor, alone: int, *others: int) -> None:
-        self.registers, self.alone, self.obeys = motor, alone, (alone, *others)
-
-    def takes(self, sent: Frame) -> list[Frame]:
-        if sent.identifier not in self.obeys:
-            return []
-        self.registers[1] = int(sent.data[:2] == b'\x7F\x04')
-        self.registers[2] = int.from_bytes(sent.data[2:4], 'little')
-        if sent.identifier != self.alone:
-            return []
-        return [frame(f'{self.alone + 1:03X}#{"37" if self.registers.runs else "31"}0B0000')]
-
-
-class Servo(ServoDrive):
-    """CiA 402: runs while its operation is enabled; register 2 is its target velocity."""
-
-    def __init__(self, motor: Motor, node: int) -> None:
-        self.registers = motor
-        super().__init__(node, {(0x60FF, 0): bytes(4), **{
-            (index, subindex): bytes.fromhex(content) for index, subindex, content in (
-                (0x1400, 2, '01'), (0x1600, 0, '02'), (0x1600, 1, '10004060'),
-                (0x1600, 2, '2000FF60'), (0x1800, 2, '01'), (0x1800, 3, '0000'),
-                (0x1800, 5, '0000'), (0x1A00, 0, '01'),
-                (0x1A00, 1, '10004160'))}})
-
-    def takes(self, sent: Frame) -> list[Frame]:
-        if not self.stopped and str(sent).startswith(f'{0x600 + self.node:03X}#40416000'):
-            self.runs_down()    # while it is asked for its state, as while it is cycled
-        answers = super().takes(sent)
-        if self.operational and sent.identifier == 0x200 + self.node and (
-                by_event := self.responses(255)):   # as its event timer would
-            answers += by_event
-            self.runs_down()
-        self.registers[1] = int(self.state == self.ENABLED)
-        self.registers[2] = self.number(0x60FF)
-        return answers
-
-    def restarts(self) -> list[Frame]:
-        self.objects[0x60FF, 0] = bytes(4)
-        return super().restarts()
-
-
-class StayingServo(Servo):
+class StayingServo(MotorServo):
     """
     CiA 402: stays in quick stop active, with 606Ch at its last value, until it is sent 0000h.
 
@@ -179,8 +83,8 @@ class StayingServo(Servo):
     stays = True
     brakes = 40
 
-    def __init__(self, motor: Motor, node: int) -> None:
-        super().__init__(motor, node)
+    def __init__(self, node: int, motor: Motor) -> None:
+        super().__init__(node, motor)
         self.objects.update({(0x606C, 0): b'\x64\0\0\0', (0x6064, 0): bytes(4)})
 
     def becomes(self, state: int) -> None:
@@ -198,8 +102,8 @@ class StayingServo(Servo):
 class OptionlessServo(StayingServo):
     """The same without a 605Ah."""
 
-    def __init__(self, motor: Motor, node: int) -> None:
-        super().__init__(motor, node)
+    def __init__(self, node: int, motor: Motor) -> None:
+        super().__init__(node, motor)
         del self.objects[0x605A, 0]
 
 
@@ -214,7 +118,7 @@ class Kind:
     """
 
     configure: Callable[[], list[DriveConfiguration]]
-    make: Callable[[Callable[[bool], None], int], Any]
+    make: Callable[[Callable[[bool, bool], object], int], Any]
     unseen: float = 0.0
     maps: bool = False
 
@@ -226,8 +130,7 @@ def _extended(*, slot: bool = False, control: bool = True, **options: Any) -> Ki
                        request=(SPEED, *more), response=(ACTUAL, CURRENT, STATUS), **options)],
         lambda moved, _: ExtendedDrive(Motor(
             {**dict(zip(range(122, 130), (50, 52 * slot, 0, 0, 209, 210, 211, 0))),
-             50: 0, 52: 0, 209: 0, 210: 0, 211: 0},
-            setpoint=50, word=52 if control else None, status=211, moved=moved)),
+             52: 0, 209: 0, 210: 0}, word=52 if control else None, moved=moved)),
         unseen=4 * PERIOD if slot or not control else 0.0,
         maps=options.get('mapping') != 'assume')
 
@@ -238,21 +141,20 @@ def _standard(*, slot: bool = False, control: bool = True) -> Kind:
         lambda: [drive('datamodel_standard', control=CONTROL if control else None, period=PERIOD,
                        request=(SPEED, *more), response=(ACTUAL, CURRENT, STATUS))],
         lambda moved, _: StandardDrive(Motor(
-            {50: 0, 52: 0, 209: 0, 210: 0, 211: 0}, setpoint=50, word=52 if control else None,
-            status=211, moved=moved)),
+            {52: 0, 209: 0, 210: 0}, word=52 if control else None, moved=moved)),
         unseen=0.005 if control else math.inf)
 
 
 def _pkw(*, slot: bool = False, control: bool = True) -> Kind:
     more = (TESYS_WORD,) if slot else ()
     return Kind(
-        lambda: [drive('canopen_pkw', station=5, table=(TESYS_STATUS, TESYS_WORD, TESYS_SPEED),
-                       control=TESYS_CONTROL if control else None, period=0.1,
+        lambda: [drive('canopen_pkw', station=5, table=TESYS, period=0.1,
+                       control=TESYS_CONTROL if control else None,
                        request=(TESYS_SPEED, *more), response=(TESYS_STATUS,),
                        parameter_timeout=0.2, refresh_interval=0.3)],
         lambda moved, _: PkwNode(5, Motor(
-            {455: 0, 704: 0, 710: 0}, setpoint=710, word=704 if control else None, status=455,
-            bits=(1, 0x80), moved=moved)),
+            {704: 0}, setpoint=710, word=704 if control else None, status=455,
+            bits=(1, 0x80, 4), moved=moved)),
         unseen=0.11 if slot else 0.0)
 
 
@@ -262,19 +164,17 @@ def _cannord(members: int = 1) -> Kind:
                        request=(FREQUENCY,), response=(), period=PERIOD,
                        broadcast='group' if members > 1 else 'none')
                  for station in range(1, members + 1)],
-        lambda moved, index: Inverter(
-            Motor({1: 0, 2: 0}, setpoint=2, word=1, moved=moved), 2 * index + 2,
-            *[0x400] * (members > 1)),
+        lambda moved, index: CannordDrive(
+            index + 1, Motor(moved=moved), *[0x400] * (members > 1)),
         unseen=4 * PERIOD * members)
 
 
-def _servo(make: type[Servo] = Servo, **options: Any) -> Kind:
+def _servo(make: type[MotorServo] = MotorServo, **options: Any) -> Kind:
     return Kind(
-        lambda: [drive('cia402', mode='pv', table=(TARGET,), request=(TARGET,), response=(),
-                       period=PERIOD, parameter_timeout=0.1, heartbeat_producer=0.0,
+        lambda: [drive('cia402', mode='pv', table=(TARGET_VELOCITY,), request=(TARGET_VELOCITY,),
+                       response=(), period=PERIOD, parameter_timeout=0.1, heartbeat_producer=0.0,
                        heartbeat_timeout=0.0, **options)],
-        lambda moved, index: make(Motor({1: 0, 2: 0}, setpoint=2, word=1, moved=moved),
-                                  index + 1))
+        lambda moved, index: make(index + 1, Motor(moved=moved)))
 
 
 KINDS: dict[str, Kind] = {
@@ -370,7 +270,8 @@ class World:
         self.sessions = make_sessions(self.kind.configure())
         self.partners: list[Partner] = []
         for index in range(len(self.sessions)):
-            device = self.kind.make(lambda moves, index=index: self.moved(index, moves), index)
+            device = self.kind.make(
+                lambda begins, moves, index=index: self.moved(index, moves), index)
             self.partners.append(Partner(index, device, device.registers))
         self.leader = self.sessions[0]
         self.control = self.leader.control is not None

@@ -13,10 +13,8 @@ from itertools import count, product
 import math
 from typing import Any
 
-from builders import (
-    ACTUAL, CONTROL, CURRENT, drive, frame, INT32, parameter, SPEED, STATUS, WORD,
-)
-from drives import ExtendedDrive, ServoDrive
+from builders import ACTUAL, CONTROL, CURRENT, drive, frame, SPEED, STATUS, TARGET_VELOCITY, WORD
+from drives import CannordDrive, ExtendedDrive, Motor, MotorServo
 from extent import some
 import pytest
 from stops import UNANSWERED_CYCLES
@@ -29,45 +27,13 @@ from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.families import make_sessions
 
 
-class Inverter:
-    """CANnord: 7F04 runs it, and whatever is broadcast to it, too."""
-
-    def __init__(self, alone: int, broadcast: bool) -> None:
-        self.alone, self.broadcast, self.runs = alone, broadcast, False
-
-    def takes(self, sent: Frame) -> list[Frame]:
-        if sent.identifier != self.alone and not (self.broadcast and sent.identifier == 0x400):
-            return []
-        self.runs = sent.data[:2] == b'\x7F\x04'
-        return [] if sent.identifier == 0x400 else [
-            frame(f'{self.alone + 1:03X}#{"37" if self.runs else "31"}0B0000')]
-
-
-class Registers(dict[int, int]):
-    """Of a 29-bit drive: 52 is its word, if it has one, and 50 its setpoint."""
-
-    def __getitem__(self, number: int) -> int:
-        return 1 | 2 * (self.get(52) == 1) if number == 211 else super().__getitem__(number)
-
-
-class Extended(ExtendedDrive):
-    """DataModel, 29 bits."""
-
-    def __init__(self, *, slot: bool) -> None:
-        super().__init__(Registers(
-            {**dict(zip(range(122, 130), (50, 52 * slot, 0, 0, 209, 210, 211, 0))),
-             50: 0, 52: 0, 209: 0, 210: 0, 211: 0}))
-
-    @property
-    def runs(self) -> bool:
-        return bool(self.registers[50] or self.registers[52])
-
-
 def _extended(period: float, *, slot: bool, **options: Any,
               ) -> tuple[list[DriveConfiguration], list[Any]]:
     return [drive(period=period, request=(SPEED, WORD) if slot else (SPEED,),
                   response=(ACTUAL, CURRENT, STATUS), control=CONTROL if slot else None,
-                  parameter_timeout=0.2, **options)], [Extended(slot=slot)]
+                  parameter_timeout=0.2, **options)], [ExtendedDrive(Motor(
+                      {**dict(zip(range(122, 130), (50, 52 * slot, 0, 0, 209, 210, 211, 0))),
+                       52: 0, 209: 0, 210: 0}, word=52 if slot else None))]
 
 
 def _cannord(period: float, members: int = 1) -> tuple[list[DriveConfiguration], list[Any]]:
@@ -75,23 +41,14 @@ def _cannord(period: float, members: int = 1) -> tuple[list[DriveConfiguration],
     return [drive('cannord', name=f'drive_{station}', station=station, request=(SPEED,),
                   response=(ACTUAL,), period=period, broadcast=broadcast)
             for station in range(1, members + 1)], [
-        Inverter(2 * station, members > 1) for station in range(1, members + 1)]
-
-
-class Servo(ServoDrive):
-    """CiA 402, node 1."""
-
-    @property
-    def runs(self) -> bool:
-        return self.state == self.ENABLED
+        CannordDrive(station, Motor(), *[0x400] * (members > 1))
+        for station in range(1, members + 1)]
 
 
 def _servo(period: float) -> tuple[list[DriveConfiguration], list[Any]]:
-    target = parameter('target_velocity', None, index=0x60FF, subindex=0, type=INT32, scale=0.1,
-                       unit='rpm')
-    return [drive('cia402', mode='pv', table=(target,), request=(target,), response=(),
-                  period=period, parameter_timeout=0.2, heartbeat_producer=0.0,
-                  heartbeat_timeout=0.0)], [Servo(1, {(0x60FF, 0): bytes(4)})]
+    return [drive('cia402', mode='pv', table=(TARGET_VELOCITY,), request=(TARGET_VELOCITY,),
+                  response=(), period=period, parameter_timeout=0.2, heartbeat_producer=0.0,
+                  heartbeat_timeout=0.0)], [MotorServo(1, Motor())]
 
 
 KINDS = {
@@ -175,7 +132,7 @@ class Bus:
         for value in (0.0, 100.0):
             leader.services.command(0, value, self.now)
             self.live(max(0.15, 1.1 * leader.configuration.period))
-        assert all(device.runs for device in self.devices)
+        assert all(device.registers.runs for device in self.devices)
 
     def run_on(self, seconds: float) -> None:
         """Go on with commands, which grow old."""
@@ -196,6 +153,10 @@ class Bus:
         assert all(session.stopped for session in self.sessions)
         return [any(isinstance(event, Noted) and event.danger for event in events)
                 for events in self.events]
+
+
+def told_to_run(device: Any) -> bool:
+    return bool(device.registers.runs or device.registers[50] or device.registers.get(52))
 
 
 LAGS = [(period, lag * period) for period in (0.01, 0.05) for lag in (
@@ -224,7 +185,7 @@ def test_a_drive_that_heard_the_stop_is_not(kind: str, period: float, delay: flo
         bus.run()
         bus.live(0.2 * place * period)
         assert bus.stop() == [False] * len(bus.devices)
-        assert not any(device.runs for device in bus.devices)
+        assert not any(told_to_run(device) for device in bus.devices)
 
 
 @pytest.mark.parametrize(('kind', 'lost', 'silence'), some(
@@ -244,7 +205,7 @@ def test_what_was_lost_before_is_no_doubt(kind: str, lost: int, silence: float) 
         bus.live(0.3)
         for session in bus.sessions[:1]:
             session.services.command(0, 100.0, bus.now)
-    if not all(device.runs for device in bus.devices):
+    if not all(device.registers.runs for device in bus.devices):
         bus.live(2.0)
         bus.run()
     assert bus.stop() == [False] * len(bus.devices)
@@ -265,7 +226,7 @@ def test_a_drive_that_misses_three_cycles_of_its_stop_gets_more(kind: str) -> No
     bus.sent.clear()
     bus.live(2.0)
     assert all(session.stopped for session in bus.sessions)
-    assert not any(device.runs for device in bus.devices)
+    assert not any(told_to_run(device) for device in bus.devices)
     assert not any(isinstance(event, Noted) and event.danger
                    for events in bus.events for event in events)
     assert bus.sent
@@ -297,11 +258,11 @@ def test_members_that_did_not_answer_get_frames_of_their_own(members: int) -> No
     bus.look()
     bus.live(0.09)
     for index in deaf:
-        bus.devices[index].broadcast = False
+        bus.devices[index].obeys = (bus.devices[index].alone,)
     bus.deaf = set()
     bus.sent.clear()
     bus.live(2.0)
-    assert not any(device.runs for device in bus.devices)
+    assert not any(told_to_run(device) for device in bus.devices)
     alone = {f'{2 * index + 2:03X}' for index in deaf}
     assert {str(each)[:3] for _, each in bus.sent} == {'400', *alone}
 
@@ -312,7 +273,7 @@ def test_members_that_a_broadcast_alone_started_are_named(refused: str) -> None:
     bus = Bus('cannord group of four', 0.02, 0.002)
     leader = bus.sessions[0]
     leader.services.submit(ControlRequest(ControlAction.ENABLE), bus.now)
-    while not bus.devices[1].runs:
+    while not bus.devices[1].registers.runs:
         for session in bus.sessions:
             session.handle_timer(bus.now)
         frames = leader.take_frames()
@@ -325,7 +286,7 @@ def test_members_that_a_broadcast_alone_started_are_named(refused: str) -> None:
             bus.now = leader.next_timer()
         bus.look()
         bus.live(0.0)
-        if not frames or not bus.devices[1].runs:
+        if not frames or not bus.devices[1].registers.runs:
             bus.live(0.019)
     bus.deaf = set(range(4))
     assert bus.stop() == [True] * 4
@@ -363,7 +324,7 @@ def test_what_was_held_until_a_stop_does_not_show_it(
         bus.run_on(held)
         bus.deaf = {0}
         assert bus.stop() == [True]
-        assert bus.devices[0].runs
+        assert bus.devices[0].registers.runs
 
 
 @pytest.mark.parametrize(('held', 'longer'), [(0.25, 0.15), (0.65, 0.3), (1.5, 0.8), (1.5, 1.2)])

@@ -17,11 +17,13 @@ from typing import Any
 
 from any_order import PATIENCE
 from builders import (
-    ACTUAL, CONTROL, CURRENT, drive, frame, INT16, INT32, LIMIT, parameter, RAM, RO, SPEED, STATUS,
-    WORD,
+    ACTUAL, CONTROL, CURRENT, drive, frame, INT16, LIMIT, parameter, SPEED, STATUS,
+    TARGET_VELOCITY, TESYS, TESYS_CONTROL, TESYS_SPEED, TESYS_STATUS, TESYS_WORD, WORD,
 )
 from conversation import Conversation
-from drives import ExtendedDrive, PkwNode, Registers, ServoDrive, StandardDrive
+from drives import (
+    CannordDrive, ExtendedDrive, Motor, MotorServo, PkwNode, ServoDrive, StandardDrive,
+)
 from hypothesis import example, given, strategies as st
 import pytest
 from timeline import Timeline
@@ -29,9 +31,7 @@ from timeline import Timeline
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import StationFound, StationLost
-from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.profile import ControlTable, StatusPattern
 
 PERIOD = 0.02
 #: s until a frame is answered
@@ -40,123 +40,15 @@ DELAY = 0.002
 SHORTEST_FAILURE = 0.005
 #: raw value of the setpoint after a power failure
 PRESET = 500
-TESYS_STATUS = parameter('system_status_1', 455, access=RO)
-TESYS_WORD = parameter('control_register_1', 704, storage=RAM)
-TESYS_SPEED = parameter('speed', 710, storage=RAM, scale=0.1, unit='Hz')
-TESYS_CONTROL = ControlTable(
-    parameter='control_register_1', disable=0, enable=1, reset_fault=8,
-    status_parameter='system_status_1', ready=StatusPattern(1, 1),
-    enabled=StatusPattern(0x80, 0x80), fault=StatusPattern(4, 4))
 FREQUENCY = parameter('frequency_setpoint', None, type=INT16)
-TARGET = parameter('target_velocity', None, index=0x60FF, subindex=0, type=INT32, scale=0.1,
-                   unit='rpm')
-
-
-class Motor:
-    """
-    What turns: runs when told to, unless it is without power or at fault.
-
-    :ivar started: called whenever it begins to run.
-    """
-
-    def __init__(self, started: Callable[[], None]) -> None:
-        self.powered, self.faulty, self.runs, self.setpoint = True, False, False, PRESET
-        self.started = started
-
-    def told(self, run: bool) -> None:
-        begins = run and not self.runs and not self.faulty
-        self.runs = run and not self.faulty
-        if begins:
-            self.started()
-
-    def trips(self) -> None:
-        self.runs, self.faulty = False, True
-
-    def loses_power(self) -> None:
-        self.powered = self.runs = self.faulty = False
-        self.setpoint = PRESET
-
-
-class MotorRegisters(Registers):
-    """Those of a drive with a motor: the word that runs it, its setpoint, its status."""
-
-    def __init__(self, motor: Motor, rest: dict[int, int], *, word: int, setpoint: int,
-                 status: int, bits: tuple[int, int, int]) -> None:
-        super().__init__({**rest, word: 0, setpoint: 0, status: 0})
-        self.motor, self.word, self.place, self.status, self.bits = (
-            motor, word, setpoint, status, bits)
-
-    def __setitem__(self, number: int, raw: int) -> None:
-        super().__setitem__(number, raw)
-        if number == self.place:
-            self.motor.setpoint = raw
-        elif number == self.word:
-            self.motor.told(raw == 1)
-
-    def update(self, entries: Any = (), **_: int) -> None:
-        # a frame is taken as a whole, and what it says of the setpoint counts when it starts
-        super().update(sorted(entries, key=lambda entry: bool(entry[0] == self.word)))
-
-    def __getitem__(self, number: int) -> int:
-        if number == self.status:
-            ready, enabled, fault = self.bits
-            motor = self.motor
-            return fault if motor.faulty else ready | enabled * motor.runs
-        return super().__getitem__(number)
-
-
-class Inverter:
-    """CANnord, station 1, one setpoint: 7F04 runs it, FE04 acknowledges."""
-
-    def __init__(self, motor: Motor) -> None:
-        self.motor = motor
-
-    def takes(self, sent: Frame) -> list[Frame]:
-        word = int.from_bytes(sent.data[:2], 'little')
-        if sent.identifier != 2:
-            return []
-        self.motor.setpoint = int.from_bytes(sent.data[2:4], 'little')
-        if word & 0x80:
-            self.motor.faulty = False
-        self.motor.told(word == 0x047F)
-        state = '38' if self.motor.faulty else '37' if self.motor.runs else '31'
-        return [frame(f'003#{state}0B0000')]
-
-
-class Servo(ServoDrive):
-    """CiA 402, node 1: its motor runs while its operation is enabled."""
-
-    def __init__(self, motor: Motor) -> None:
-        self.motor = motor
-        super().__init__(1, {(0x60FF, 0): bytes(4), (0x6064, 0): bytes(4)})
-
-    def takes(self, sent: Frame) -> list[Frame]:
-        motor = self.motor
-        if motor.faulty is not (self.state == self.FAULT):
-            self.becomes(self.FAULT if motor.faulty else self.OFF)
-        elif self.state == self.ENABLED and not motor.runs:
-            self.becomes(self.OFF)      # by hand
-        answers = super().takes(sent)
-        motor.setpoint = self.number(0x60FF)
-        motor.faulty = self.state == self.FAULT
-        motor.told(self.state == self.ENABLED)
-        return answers
-
-    def restarts(self) -> list[Frame]:
-        self.objects[0x60FF, 0] = PRESET.to_bytes(4, 'little')
-        return super().restarts()
-
-
-def datamodel(motor: Motor, slot: int = 0) -> MotorRegisters:
+def datamodel(slot: int = 0) -> Motor:
     """Return what has its control word in the third request slot, or by number only."""
-    table = {51: 0, 209: 0, 210: 0, 122: 50, 123: 51, 124: slot, 125: 0, 126: 209, 127: 210,
-             128: 211, 129: 0}
-    return MotorRegisters(motor, table, word=52, setpoint=50, status=211, bits=(1, 2, 8))
+    return Motor({50: PRESET, 51: 0, 209: 0, 210: 0,
+                  **dict(zip(range(122, 130), (50, 51, slot, 0, 209, 210, 211, 0)))})
 
 
-def tesys(motor: Motor) -> PkwNode:
-    node = PkwNode(5, MotorRegisters(motor, {}, word=704, setpoint=710, status=455,
-                                     bits=(0x01, 0x80, 0x04)))
+def tesys() -> PkwNode:
+    node = PkwNode(5, Motor({710: PRESET}, setpoint=710, word=704, status=455, bits=(1, 0x80, 4)))
     node.operational = True
     return node
 
@@ -168,28 +60,30 @@ def drive_of(protocol: str, *more: Parameter, **options: Any) -> DriveConfigurat
 
 
 def tesys_of(*more: Parameter) -> DriveConfiguration:
-    return drive('canopen_pkw', station=5, table=(TESYS_STATUS, TESYS_WORD, TESYS_SPEED),
-                 control=TESYS_CONTROL, period=0.1, request=(TESYS_SPEED, *more),
-                 response=(TESYS_STATUS,), parameter_timeout=0.5, refresh_interval=0.15)
+    return drive('canopen_pkw', station=5, table=TESYS, control=TESYS_CONTROL, period=0.1,
+                 request=(TESYS_SPEED, *more), response=(TESYS_STATUS,),
+                 parameter_timeout=0.5, refresh_interval=0.15)
 
 
 #: how a drive is set up, and how long (s) what happened in it may be unknown
-KINDS: dict[str, tuple[Callable[[Motor], Any], Callable[[], DriveConfiguration], float]] = {
-    '29 bit, by number': (lambda motor: ExtendedDrive(datamodel(motor)),
+KINDS: dict[str, tuple[Callable[[], Any], Callable[[], DriveConfiguration], float]] = {
+    '29 bit, by number': (lambda: ExtendedDrive(datamodel()),
                           lambda: drive_of('datamodel_extended'), 0.0),
-    '29 bit, in its slot': (lambda motor: ExtendedDrive(datamodel(motor, slot=52)),
+    '29 bit, in its slot': (lambda: ExtendedDrive(datamodel(slot=52)),
                             lambda: drive_of('datamodel_extended', WORD), 4 * PERIOD),
-    '11 bit, by number': (lambda motor: StandardDrive(datamodel(motor)),
+    '11 bit, by number': (lambda: StandardDrive(datamodel()),
                           lambda: drive_of('datamodel_standard'), 0.0),
     '11 bit, with its setpoints': (
-        lambda motor: StandardDrive(datamodel(motor)),
+        lambda: StandardDrive(datamodel()),
         lambda: drive_of('datamodel_standard', WORD, refresh_interval=0.05), 0.005),
     'PKW, by number': (tesys, tesys_of, 0.0),
     'PKW, with its setpoints': (tesys, lambda: tesys_of(TESYS_WORD), 0.11),
-    'CiA 402': (Servo, lambda: drive(
-        'cia402', mode='pv', table=(TARGET,), request=(TARGET,), response=(), period=PERIOD,
-        parameter_timeout=0.1, heartbeat_producer=0.0, heartbeat_timeout=0.0), 0.0),
-    'CANnord': (Inverter, lambda: drive(
+    'CiA 402': (
+        lambda: MotorServo(1, Motor({50: PRESET}), {(0x6064, 0): bytes(4)}),
+        lambda: drive('cia402', mode='pv', table=(TARGET_VELOCITY,), request=(TARGET_VELOCITY,),
+                      response=(), period=PERIOD, parameter_timeout=0.1, heartbeat_producer=0.0,
+                      heartbeat_timeout=0.0), 0.0),
+    'CANnord': (lambda: CannordDrive(1, Motor({50: PRESET})), lambda: drive(
         'cannord', table=(FREQUENCY,), request=(FREQUENCY,), response=(), period=PERIOD),
         4 * PERIOD),
 }
@@ -205,8 +99,10 @@ class Story:
 
     def __init__(self, kind: str) -> None:
         make, configure, self.unknown = KINDS[kind]
-        self.motor = Motor(self.starts)
-        self.device = make(self.motor)
+        self.device = make()
+        self.motor: Motor = self.device.registers
+        self.motor.moved = lambda begins, moves: begins and self.starts()
+        self.powered = True
         self.talk = Conversation(configure())
         self.line = Timeline(self.talk, self.answer)
         self.kind = kind
@@ -228,17 +124,19 @@ class Story:
         # where nobody acknowledges a setpoint, nobody knows that it got lost, or forgotten at once
         unheard = '11 bit' in self.kind and (
             self.lost_any or now - self.stopped_at < SHORTEST_FAILURE)
-        assert self.motor.setpoint == 0 or unheard or not known, (
-            f'started with {self.motor.setpoint} at {now}: {self.line.log[-20:]}')
+        setpoint = self.motor[self.motor.setpoint]
+        assert setpoint == 0 or unheard or not known, (
+            f'started with {setpoint} at {now}: {self.line.log[-20:]}')
 
     def answer(self, text: str) -> tuple[float, str] | None:
         now = self.talk.now
-        if not self.motor.powered:
+        if not self.powered:
             return None
         if now < self.deaf_until:
             self.lost_any = True
             return None
         answers = self.device.takes(frame(text))
+        self.motor.look()
         if not answers or now < self.mute_until:
             return None
         return DELAY, str(answers[0])
@@ -288,20 +186,19 @@ class Story:
         self.stopped_at = self.talk.now
         # a call that nobody has answered yet goes on, unless the session sees what happened
         self.allowed = self.allowed and self.enabling
-        if how == 'trip':
-            self.motor.trips()
-        elif how == 'hand':
-            self.motor.runs = False
+        if how != 'power':
+            self.motor.stops(faulty=how == 'trip' or self.motor.faulty)
         else:
-            self.motor.loses_power()
+            self.powered = False
+            self.motor.restarts(PRESET)
             if isinstance(self.device, (PkwNode, ServoDrive)):
                 self.device.restarts()
 
     def comes_back(self) -> None:
         """Somebody acknowledges, or power is there again."""
         self.motor.faulty = False
-        if not self.motor.powered:
-            self.motor.powered = True
+        if not self.powered:
+            self.powered = True
             self.stopped_at = self.talk.now     # another drive, as it were
             if isinstance(self.device, (PkwNode, ServoDrive)):
                 self.line.took(self.talk.hears(f'70{self.device.node}#00', self.talk.now))
@@ -356,7 +253,7 @@ def test_users_start_it(kind: str) -> None:
     story = Story(kind)
     story.runs()
     assert story.motor.runs
-    assert story.motor.setpoint not in (0, PRESET)
+    assert story.motor[story.motor.setpoint] not in (0, PRESET)
     story.stops_there('trip')
     story.passes(0.5)
     story.comes_back()

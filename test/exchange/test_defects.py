@@ -13,7 +13,7 @@ from itertools import count, product
 from typing import Any
 
 from builders import ACTUAL, CONTROL, CURRENT, drive, frame, LIMIT, SPEED, STATUS, WORD
-from drives import ExtendedDrive, PkwNode, StandardDrive
+from drives import CannordDrive, ExtendedDrive, Motor, PkwNode, StandardDrive
 from exchange_builders import Bench
 from extent import some
 import pytest
@@ -27,38 +27,13 @@ from drive_can_bridge.exchange.member import Member
 
 #: s: of the drives, and until an answer
 PERIOD, DELAY = 0.05, 0.001
-WORDS = dict.fromkeys((50, 51, 52), 0)
 #: 100 % is 03E8h
 TORQUE = replace(LIMIT, neutral=100.0, limit=True)
 
 
-class Inverter:
-    """CANnord: 7F04 runs it; what it obeys is in registers 50 and 52."""
-
-    def __init__(self, registers: dict[int, int], alone: int, *broadcasts: int) -> None:
-        self.registers, self.alone, self.obeys = registers, alone, (alone, *broadcasts)
-
-    def takes(self, sent: Frame) -> list[Frame]:
-        if sent.identifier not in self.obeys:
-            return []
-        self.registers[52] = int(sent.data[:2] == b'\x7F\x04')
-        self.registers[50] = int.from_bytes(sent.data[2:4], 'little')
-        state = '370B' if self.registers[52] else '310B'
-        return [frame(f'{self.alone + 1:03X}#{state}E803FA000000')] * (
-            sent.identifier == self.alone)
-
-
-class Status(dict[int, int]):
-    """Registers of which 211 is the status: ready, and enabled while 52 holds 1."""
-
-    def __getitem__(self, number: int) -> int:
-        return 1 | 2 * (super().__getitem__(52) == 1) if number == 211 else super().__getitem__(
-            number)
-
-
-def _registers(second: int = 0) -> dict[int, int]:
+def _registers(second: int = 0) -> Motor:
     maps = zip(range(122, 130), (50, second, 0, 0, 209, 210, 211, 0))
-    return Status({**WORDS, **dict(maps), 209: 1000, 210: 250, 211: 1})
+    return Motor({**dict(maps), 51: 0, 209: 1000, 210: 250})
 
 
 def _extended(*second: Parameter) -> tuple[list[DriveConfiguration], list[Any]]:
@@ -69,7 +44,7 @@ def _extended(*second: Parameter) -> tuple[list[DriveConfiguration], list[Any]]:
         for _ in range(2)]
 
 
-def _single(protocol: str, make: Callable[[int, dict[int, int]], Any], *,
+def _single(protocol: str, make: Callable[[int, Motor], Any], *,
             control: bool = True, second: tuple[Parameter, ...] = (),
             ) -> tuple[list[DriveConfiguration], list[Any]]:
     return [drive(protocol, name=name, station=station, request=(SPEED, *second), period=PERIOD,
@@ -82,7 +57,7 @@ def _cannord(broadcast: str) -> tuple[list[DriveConfiguration], list[Any]]:
     return [drive('cannord', name=name, station=station, request=(SPEED,), period=PERIOD,
                   response=(ACTUAL, CURRENT), broadcast=broadcast)
             for name, station in (('first', 1), ('second', 2))], [
-        Inverter(dict(WORDS), 2 * station, *[0x400] * (broadcast != 'none'))
+        CannordDrive(station, _registers(), *[0x400] * (broadcast != 'none'))
         for station in (1, 2)]
 
 
