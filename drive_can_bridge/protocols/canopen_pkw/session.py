@@ -336,7 +336,7 @@ class PkwSession(Session):
     # -- timer ------------------------------------------------------------------------------------
 
     def handle_timer(self, now: float) -> None:
-        if self._writers.expire(now):
+        if now >= self._expires_at and self._writers.expire(now):
             self._writers.write_setpoints(now)
         super().handle_timer(now)
         if now >= self._round_due:
@@ -353,8 +353,13 @@ class PkwSession(Session):
         """When the next round is due; infinity: not before this one has ended."""
         return math.inf if self._exchange.reading else self._exchange.timer.due
 
+    @property
+    def _expires_at(self) -> float:
+        """When setpoints have to be looked at for their age; infinity: the stop writes all."""
+        return self.setpoints.expires_at if self.stage is Stage.RUNNING else math.inf
+
     def next_timer(self) -> float:
-        return min(self._round_due, self.setpoints.expires_at, super().next_timer())
+        return min(self._round_due, self._expires_at, super().next_timer())
 
     def control_refusal(self, action: ControlAction, refusal: Sentence, *,
                         offline: bool) -> Sentence:
