@@ -18,7 +18,7 @@ from drive_can_bridge.core.messages import together
 from drive_can_bridge.core.sentences import (
     may_still_be_running, no_answer_to_stop, nobody_answered, nobody_takes, write_not_confirmed)
 from drive_can_bridge.monitor.snapshot import OperationOutcome, StopAction
-from drive_can_bridge.ros.client.calls import OFFER_TIMEOUT
+from drive_can_bridge.ros.client.calls import LONGEST_PATIENCE, OFFER_TIMEOUT
 from drive_can_bridge.ros.monitor.client import PARAMETER_TIMEOUT, ServiceOperations
 from drive_can_bridge.ros.passing import NodeEnd
 
@@ -99,6 +99,25 @@ def test_what_is_asked_of_a_drive_is_asked_once_it_knows_us(client: Client) -> N
             assert shy.writes == 3
     finally:
         shy.close()
+
+
+def test_who_is_known_late_is_answered_soon_after(client: Client) -> None:
+    """Where a message of discovery is lost, Fast DDS sends it again after 3 s, or 6 s."""
+    shy, told = Shy(client, known_after=1_000_000), list[OperationOutcome]()
+    begun = clock().now()
+
+    def answered() -> bool:
+        if clock().now() > begun + 3.2:
+            shy.known_after = 0
+        return not operations.poll({}, clock().now())
+    try:
+        with asking(client) as operations:
+            operations.write('/lift', 'ramp_time', 1.5, told.append, begun)
+            wait_until(answered, what='an answer')
+        assert 3.2 < clock().now() - begun < 3.2 + 2.0 * LONGEST_PATIENCE
+    finally:
+        shy.close()
+    assert told == [OperationOutcome(True, '')]
 
 
 def test_a_write_that_was_sent_and_not_answered_may_have_been_done(client: Client) -> None:

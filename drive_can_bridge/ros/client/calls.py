@@ -43,8 +43,9 @@ from drive_can_bridge.ros.rcl.end import Names, TopicEnd
 sys.modules.setdefault('rosidl_generator_py.generate_py_impl', None)    # type: ignore[arg-type]
 #: what is asked of a node to know that it knows us: of no parameter
 GREETING = 'get_parameter_types', GetParameterTypes
-#: s after which a greeting is repeated for the first time; then twice as many, and so on
-FIRST_PATIENCE = 0.1
+#: s after which a greeting is repeated for the first time; then twice as many, up to the second
+#: (where the network loses messages, discovery is repaired every 3 s: that is to be noticed soon)
+FIRST_PATIENCE, LONGEST_PATIENCE = 0.1, 0.5
 #: what changes nothing
 ASKING: dict[str, Any] = {
     'get_parameters': GetParameters, 'list_parameters': ListParameters,
@@ -397,7 +398,7 @@ class _Host:
                 return
             greeting.send(GREETING[1].Request(), self._told(now, _nothing), now)
             self._greet_at = now + self._pause
-            self._pause *= 2.0
+            self._pause = min(2.0 * self._pause, LONGEST_PATIENCE)
         greeting.look(now)
 
     def _told(self, asked_at: float, done: Done) -> Done:
