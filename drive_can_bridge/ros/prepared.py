@@ -10,12 +10,13 @@ A message in whose bytes the numbers cannot be found (a bool is one byte, and no
 distinctive) is published the ordinary way.
 """
 
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 import struct
 from typing import Any, NamedTuple
 
 from rclpy.publisher import Publisher
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 
 from drive_can_bridge.core.parameters import ValueKind
 from drive_can_bridge.ros.rcl.outgoing import publish_bytes
@@ -68,8 +69,26 @@ def find_layout(message: Any, numbers: Sequence[Number]) -> ConstantBytes | None
     for order in '<>':
         constants = _constants(data, order, codes, markers)
         if constants:
-            return ConstantBytes(order, constants, codes)
+            *before, rest = constants
+            end = _end_of(message, data, len(data) - len(rest))
+            return ConstantBytes(order, (*before, data[len(data) - len(rest):end]), codes)
     return None
+
+
+def _end_of(message: Any, data: bytes, least: int) -> int:
+    """
+    Return where the message ends in its bytes, at ``least`` there.
+
+    Fast DDS makes them longer: it has added up the alignment of elements that empty arrays do not
+    have. rclpy passes over the rest; rosbags, for one, refuses the whole.
+    """
+    def is_whole(length: int) -> bool:
+        try:
+            return bool(deserialize_message(data[:length], type(message)) == message)
+        except RuntimeError:    # it is too short
+            return False
+    lengths = range(least, len(data))
+    return lengths.start + bisect_left(lengths, True, key=is_whole)
 
 
 def _marker(code: str, index: int) -> Any:

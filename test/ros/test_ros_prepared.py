@@ -12,7 +12,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Int64
 
-from drive_can_bridge.ros.prepared import PreparedMessage
+from drive_can_bridge.ros.prepared import find_layout, PreparedMessage
 
 EXTREMES = [0.0, -0.0, 1.5, -12.3, math.inf, -math.inf, 1.7976931348623157e308, 5e-324]
 
@@ -99,6 +99,27 @@ def test_rows_of_numbers(client: Client) -> None:
         assert (list(one.name), len(one.velocity)) == (names, 0)
         assert (one.header.stamp.sec, one.header.stamp.nanosec,
                 *one.position, *one.effort) == wanted
+
+
+@pytest.mark.parametrize(('message', 'length'), [
+    (JointState(name=['joint'], position=[0.0]), 60),
+    (ParameterEvent(node='/axis', changed_parameters=[Parameter(name=name, value=ParameterValue(
+        type=ParameterType.PARAMETER_DOUBLE)) for name in ('speed', 'torque')]), 156),
+    (Float64(), 12),
+], ids=['joint state', 'sample', 'number'])
+def test_no_byte_more_than_a_message_has(message: Any, length: int) -> None:
+    """
+    As long as what an ordinary publisher sends: some tools refuse what is longer.
+
+    Fast DDS serialises 68 bytes, and 172, of these: it has added up the alignment of empty arrays.
+    """
+    numbers = [('d', partial(setattr, message, 'data'))] if isinstance(message, Float64) else [
+        ('d', partial(message.position.__setitem__, 0))] if isinstance(message, JointState) else [
+        ('d', partial(setattr, entry.value, 'double_value'))
+        for entry in message.changed_parameters]
+    layout = find_layout(message, numbers)
+    assert layout is not None
+    assert len(b''.join(layout.constants)) + 8 * len(numbers) == length
 
 
 def test_what_is_not_found_once_and_in_order_is_not_prepared(client: Client) -> None:
