@@ -17,13 +17,16 @@ from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.frame import Record
-from drive_can_bridge.core.text import is_pattern, printable
+from drive_can_bridge.core.text import printable
+from drive_can_bridge.host_texts import is_pattern
 from drive_can_bridge.protocols.observer import Telegram
 from drive_can_bridge.resources import command_that_brings
-from drive_can_bridge.trace.files import (
-    Channels, check_readable, open_text, read_records, READABLE, UnknownFormat)
+from drive_can_bridge.trace.channels import Channels
+from drive_can_bridge.trace.files import read_records
+from drive_can_bridge.trace.formats import check_readable, READABLE, UnknownFormat
 from drive_can_bridge.trace.sinks import LineWriter, Only, Plotter, Selection, TableWriter
 from drive_can_bridge.trace.tracer import Sink, summary_documents, summary_lines, Tracer
+from drive_can_bridge.trace.writers import open_text
 
 #: the place in a file of a complaint
 _PLACE = re.compile(r'(?:line|entry) \d+: ')

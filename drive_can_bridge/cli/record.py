@@ -18,8 +18,9 @@ from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.frame import bits_on_bus, Record, RecordKind, STUFFING
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
-from drive_can_bridge.trace.files import (
-    check_writable, labels, LOSSES, TraceWriter, UnknownFormat, WRITABLE)
+from drive_can_bridge.trace.channels import labels
+from drive_can_bridge.trace.formats import check_writable, LOSSES, UnknownFormat, WRITABLE
+from drive_can_bridge.trace.writers import TraceWriter
 from drive_can_bridge.transport.tap import QUEUE_MAX, Tap
 
 #: s between two looks at the clock while nothing arrives

@@ -29,7 +29,8 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.frame import DATA, Frame, Record, RecordKind
-from drive_can_bridge.trace.files import format_record, labels
+from drive_can_bridge.trace.candump import format_record
+from drive_can_bridge.trace.channels import labels
 
 #: most that a ring may take
 MEMORY_MAX = 64 * 2**20

@@ -19,7 +19,7 @@ from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.observer import (
     DriveObserver, Handler, Observed, Telegram, TelegramKind, Verdict)
 from drive_can_bridge.protocols.telegrams import Direction
-from drive_can_bridge.trace.files import Channels
+from drive_can_bridge.trace.channels import Channels
 from drive_can_bridge.transport.error_frames import decode_error_frame
 
 #: identifiers whose owner is remembered; of those of a healthy bus there are a few hundred

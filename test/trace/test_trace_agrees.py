@@ -27,9 +27,10 @@ from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.simulation import Simulation
-from drive_can_bridge.trace.files import read_records, TraceWriter
+from drive_can_bridge.trace.files import read_records
 from drive_can_bridge.trace.sinks import LineWriter, Selection
 from drive_can_bridge.trace.tracer import Tracer
+from drive_can_bridge.trace.writers import TraceWriter
 
 
 class Listener:

@@ -21,9 +21,11 @@ from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.frame import Record, RecordKind
 from drive_can_bridge.trace import files
-from drive_can_bridge.trace.files import (
-    Channels, check_writable, format_record, labels, parse_line, read_records, TraceWriter,
-    UnknownFormat, WRITABLE)
+from drive_can_bridge.trace.candump import format_record, parse_line
+from drive_can_bridge.trace.channels import Channels, labels
+from drive_can_bridge.trace.files import read_records
+from drive_can_bridge.trace.formats import check_writable, UnknownFormat, WRITABLE
+from drive_can_bridge.trace.writers import TraceWriter
 
 DATA, ERROR = RecordKind.DATA, RecordKind.ERROR
 
@@ -481,7 +483,7 @@ def test_a_full_disk_is_told_with_the_name_of_the_file(suffix: str, tmp_path: Pa
 FULL = """
 import pathlib, resource, sys, time
 from drive_can_bridge.core.frame import Record
-from drive_can_bridge.trace.files import TraceWriter
+from drive_can_bridge.trace.writers import TraceWriter
 path, looking = pathlib.Path(sys.argv[1]), sys.argv[2] == 'looking'
 resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
 writer = TraceWriter(path, ['can0'])
