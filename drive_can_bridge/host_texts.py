@@ -1,12 +1,21 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What is said to people before anything that takes time may be imported, and of processes.
+Texts for people before anything that takes time may be imported, and the rule for patterns.
 
-Mere texts with their fields in braces: ``drive_can stop`` sends a stop before it imports the
+The texts have their fields in braces: ``drive_can stop`` sends a stop before it imports the
 catalogue. :mod:`drive_can_bridge.core.host_sentences` has them as rows, with what to do.
 """
 
-# -- what became of a stop, or of an order
+#: what makes a word a shell pattern
+WILD = frozenset('*?[')
+
+
+def is_pattern(text: str) -> bool:
+    """Return whether a text is a shell pattern, and no name."""
+    return not WILD.isdisjoint(text)
+
+
+# -- results of a stop, or of another command
 may_run = '{why}: may still be running'
 drives_may_run = '{why}: its drives may still be running'
 bridge_does_not_answer = 'this bridge does not answer: its drives may still be running'

@@ -42,7 +42,7 @@ INTERNAL: dict[str, set[str]] = {
     'simulation': {'', 'clock', 'core', 'configuration', 'protocols', 'resources', 'transport'},
     'ros': {
         '', 'clock', 'core', 'configuration', 'protocols', 'resources', 'trace', 'transport',
-        'exchange', 'memory', 'process', 'ros.client', 'ros.messages', 'ros.rcl',
+        'exchange', 'host_texts', 'memory', 'process', 'ros.client', 'ros.messages', 'ros.rcl',
         'ros.recognition'},
     'monitor': {'', 'core'},
     'view': {'', 'clock', 'core', 'monitor'},

@@ -16,7 +16,7 @@ from drive_can_bridge.cli.stopping import answers, show
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.bridges import chosen_drives, UnknownDrive
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
-from drive_can_bridge.core.text import is_pattern
+from drive_can_bridge.host_texts import is_pattern
 from drive_can_bridge.process.local_stop import Answer, begun, LocalStop
 from drive_can_bridge.process.local_way import matches
 from drive_can_bridge.resources import what_is_missing
@@ -86,11 +86,11 @@ def _given_locally(args: Namespace) -> list[Answer] | None:
 
 def _given(args: Namespace) -> list[Answer]:
     """Command drives through ROS."""
-    graph, control = _ros(args)
+    graph, commands = _ros(args)
     try:
-        nodes = chosen_drives(args.words, args.namespace, partial(control.known_drives, graph),
+        nodes = chosen_drives(args.words, args.namespace, partial(commands.known_drives, graph),
                               matches)
-        found: list[Answer] = control.give(graph, args.subcommand, nodes)
+        found: list[Answer] = commands.give(graph, args.subcommand, nodes)
         return found
     finally:
         graph.close()
@@ -105,14 +105,14 @@ def _ros(args: Namespace, join: Callable[[Callable[[], Any]], Any] = lambda make
     :raises DriveCanError: no ROS.
     """
     try:
-        from drive_can_bridge.ros.client.calls import ClientNode
+        from drive_can_bridge.ros.client.client_node import ClientNode
         # is being discovered while the rest is imported
         client_node = join(partial(ClientNode, 'client'))
-        from drive_can_bridge.ros.client import control
-        from drive_can_bridge.ros.client.search import Graph
+        from drive_can_bridge.ros.client import drive_commands
+        from drive_can_bridge.ros.client.graph import Graph
     except ImportError as error:
         raise DriveCanError(what_is_missing(f'drive_can {args.subcommand}', error)) from error
-    return Graph(args.clock, client_node), control
+    return Graph(args.clock, client_node), drive_commands
 
 
 def _check(args: Namespace) -> None:
@@ -225,8 +225,8 @@ class _RosStop:
         if self._joining.failure is not None and local.over(now):
             raise self._joining.failure
         if self._joining.done is not None:
-            graph, control = self._joining.done
-            self._stop = control.StopRequests(graph.client_node, args.namespace, args.words, [
+            graph, commands = self._joining.done
+            self._stop = commands.StopRequests(graph.client_node, args.namespace, args.words, [
                 each.name for each in local.present
                 if each.domain == local.domain and each.has_place])
 

@@ -14,8 +14,10 @@ from drive_can_bridge.cli.command import (
 from drive_can_bridge.cli.output import waiting
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
-from drive_can_bridge.core.text import is_pattern, printable
-from drive_can_bridge.process.signals import Interruption, NOT_SUSPENDED, postponed
+from drive_can_bridge.core.text import printable
+from drive_can_bridge.host_texts import is_pattern
+from drive_can_bridge.process.critical_sections import Interruption, postponed
+from drive_can_bridge.process.signals import NOT_SUSPENDED
 from drive_can_bridge.resources import what_is_missing
 
 #: s: the default, and the longest time
@@ -63,8 +65,8 @@ def run(args: Namespace) -> int:
     must_be_answerable(yes=args.yes, otherwise='nothing was moved', yes_means=_YES_MEANS)
     try:
         from drive_can_bridge.client.jog import find_target
-        from drive_can_bridge.ros.client.calls import ClientNode
-        from drive_can_bridge.ros.client.search import Graph
+        from drive_can_bridge.ros.client.client_node import ClientNode
+        from drive_can_bridge.ros.client.graph import Graph
     except ImportError as error:
         raise DriveCanError(what_is_missing('drive_can jog', error)) from error
     graph = Graph(args.clock, ClientNode('jog'))

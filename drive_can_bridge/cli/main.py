@@ -134,7 +134,7 @@ PROGRAM = 'drive_can'
 #: options of the program itself
 _OF_ALL = ('-h', '--help', '--version')
 #: the module of a subcommand, where it is not called so itself
-MODULES = dict.fromkeys(('stop', 'enable', 'disable', 'reset'), 'control')
+MODULES = dict.fromkeys(('stop', 'enable', 'disable', 'reset'), 'hand')
 #: what runs until a signal comes: that is no failure
 ENDLESS = ('simulate', 'demo', 'record', 'monitor', 'panel')
 #: options that make a subcommand one of these

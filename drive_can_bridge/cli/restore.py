@@ -21,7 +21,7 @@ from drive_can_bridge.core.codes import code_of
 from drive_can_bridge.core.messages import around
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.text import counted, printable, value_text
-from drive_can_bridge.process.signals import Interruption, postponed
+from drive_can_bridge.process.critical_sections import Interruption, postponed
 
 #: s that a drive's identity is waited for
 _PATIENCE = 2.0

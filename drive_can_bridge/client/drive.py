@@ -37,7 +37,7 @@ from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.requests import FailureKind
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.process.signals import finish_first
+from drive_can_bridge.process.critical_sections import finish_first
 
 if TYPE_CHECKING:   # read through a bridge it is not needed
     from drive_can_bridge.core.profile import RestoreTable

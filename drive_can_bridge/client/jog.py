@@ -26,9 +26,11 @@ from drive_can_bridge.core.errors import DriveCanError, ValueRefused, WhichBridg
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.core.text import printable, value_text
-from drive_can_bridge.ros.client.calls import (
-    Inbox, NewestPublisher, NodeCalls, undemanding_quality)
-from drive_can_bridge.ros.client.search import find_drives, Graph
+from drive_can_bridge.ros.client.calls import NodeCalls
+from drive_can_bridge.ros.client.graph import Graph
+from drive_can_bridge.ros.client.search import find_drives
+from drive_can_bridge.ros.client.subscriptions import (
+    Inbox, NewestPublisher, undemanding_quality)
 from drive_can_bridge.ros.messages import drive_value, value_of
 from drive_can_bridge.ros.rcl.quality import latched_quality
 from drive_can_bridge.ros.recognition import namespace_of

@@ -11,7 +11,8 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import NoBridge
 from drive_can_bridge.core.parameters import Value
-from drive_can_bridge.ros.client.search import find_drives, Graph
+from drive_can_bridge.ros.client.graph import Graph
+from drive_can_bridge.ros.client.search import find_drives
 from drive_can_bridge.ros.messages import limits_of, parameter_message, plain
 
 

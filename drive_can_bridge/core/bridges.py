@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
-from drive_can_bridge.core.text import is_pattern
+from drive_can_bridge.host_texts import is_pattern
 
 
 class UnknownDrive(DriveCanError):

@@ -119,15 +119,6 @@ def facts_in(constraints: str) -> dict[str, str]:
             for key, separator, value in pairs if separator}
 
 
-#: what makes a shell pattern of a name
-_WILD = frozenset('*?[')
-
-
-def is_pattern(text: str) -> bool:
-    """Return whether a text is a shell pattern, and no name."""
-    return not _WILD.isdisjoint(text)
-
-
 _ROS_NAME = re.compile(r'(/[A-Za-z_][A-Za-z0-9_]*)+')
 
 

@@ -15,7 +15,7 @@ import subprocess
 import sys
 from typing import IO
 
-from drive_can_bridge.process.signals import signals_held
+from drive_can_bridge.process.critical_sections import signals_held
 
 #: what can be run: module with ``main()``
 PROGRAMS = {

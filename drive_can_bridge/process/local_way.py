@@ -41,7 +41,8 @@ import os
 import socket
 import sys
 
-from drive_can_bridge.process.presence import Present, WILD
+from drive_can_bridge.host_texts import is_pattern
+from drive_can_bridge.process.presence import Present
 
 VERSION = '1'
 #: bytes of a packet; of all packets of what is asked
@@ -76,11 +77,6 @@ def matches(word: str, node: str) -> bool:
         return False
     from fnmatch import fnmatchcase
     return fnmatchcase(name, word)
-
-
-def is_pattern(word: str) -> bool:
-    """Return whether a word is a shell pattern, and no name."""
-    return any(wild in word for wild in WILD)
 
 
 class Rubbish(Exception):

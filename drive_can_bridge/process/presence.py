@@ -26,8 +26,6 @@ BRIDGE = 'drive_can_bridge'
 TABLE = '/proc/net/unix'
 #: switches the local way off: the value ``off``
 SWITCH = 'DRIVE_CAN_LOCAL'
-#: what makes a word a shell pattern
-WILD = '*?['
 #: characters that have room in the name of a socket, and how many of longer ones are kept
 _ROOM, _KEPT = 70, 60
 
@@ -144,7 +142,8 @@ def bridges() -> list[Present]:
 
 def _may_mean(word: str, place: str) -> bool:
     """Return whether a full name, or a pattern of some, may mean a drive in a namespace."""
-    literal = word[:min((word.find(wild) for wild in WILD if wild in word), default=len(word))]
+    literal = word[:min((word.find(wild) for wild in host_texts.WILD if wild in word),
+                        default=len(word))]
     if literal.startswith(place):
         return '/' not in literal[len(place):]
     return literal != word and place.startswith(literal)

@@ -11,19 +11,15 @@ rclpy's own handlers shut the context down first, so that no neutral frame could
 handlers only run between two bytecodes of the main thread. So the signal is taken from the wake-up
 file descriptor, which the interpreter's C handler writes to, by a thread of its own: a second
 signal works even while the main thread hangs in a library.
-
-Steps that a signal does not break off in the middle.
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
 import math
 import os
 import signal
 import socket
 import threading
 from types import TracebackType
-from typing import Any
 
 from drive_can_bridge import host_texts
 from drive_can_bridge.clock import Clock, Mailbox
@@ -152,91 +148,3 @@ def _attempt(step: Callable[..., object], *arguments: float) -> None:
 
 def _ignore(*_: object) -> None:
     """Do nothing: the wake-up descriptor does the work."""
-
-
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
-
-@contextmanager
-def finish_first() -> Iterator[None]:
-    """
-    Postpone SIGINT and SIGTERM until the step in here is complete.
-
-    Nested steps are one step. In other threads than the main one nothing has to be done: signals
-    are not handled there.
-
-    :raises KeyboardInterrupt: at the end of the step, as after any Ctrl-C.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    received: list[int] = []
-
-    def note(number: int, _: Any) -> None:
-        received.append(number)
-    before = {number: signal.signal(number, note) for number in _SIGNALS}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        if received:
-            os.kill(os.getpid(), received[0])   # now by its other handler
-
-
-@contextmanager
-def signals_held() -> Iterator[None]:
-    """
-    Block signals in a process that is started in here, until it unblocks them.
-
-    Else its interpreter answers one with a traceback, as soon as it is there.
-    """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-class Interruption:
-    """
-    Whether a signal has asked for the end.
-
-    :ivar number: of the signal; None: none has.
-    """
-
-    def __init__(self) -> None:
-        self.number: int | None = None
-
-    def __bool__(self) -> bool:
-        """Return whether a signal came."""
-        return self.number is not None
-
-    @property
-    def exit_code(self) -> int:
-        """The exit code, as a shell shows it; as after Ctrl-C where the signal is unknown."""
-        return 128 + (signal.SIGINT if self.number is None else self.number)
-
-
-@contextmanager
-def postponed(told: Callable[[], object]) -> Iterator[Interruption]:
-    """
-    Record SIGINT, SIGTERM and SIGHUP only; the work in here ends where it can.
-
-    :param told: called once, when the first signal comes. The terminal to which it may write
-        is perhaps gone: that is what SIGHUP means.
-    """
-    noted = Interruption()
-
-    def note(number: int, _: Any) -> None:
-        if not noted:
-            noted.number = number
-            with suppress(OSError):
-                told()
-
-    before = {number: signal.signal(number, note) for number in (*_SIGNALS, signal.SIGHUP)}
-    try:
-        yield noted
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

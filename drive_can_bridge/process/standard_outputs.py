@@ -17,7 +17,6 @@ The last lines are waited for until they are written, unless their reader hangs.
 
 from array import array
 from collections import deque
-from collections.abc import Callable
 from contextlib import ExitStack
 import fcntl
 import os
@@ -27,53 +26,7 @@ import threading
 
 from drive_can_bridge import host_texts
 from drive_can_bridge.clock import Clock
-
-#: s after which the reader of a write counts as hung
-PATIENCE = 2.0
-#: s between two looks
-MOMENT = 0.05
-
-
-class Taking:
-    """
-    Whether the reader takes what a thread writes; a context manager around each single write.
-
-    That a thread has not begun to write is no sign: on a busy machine it has to wait for its
-    turn. A write that does not end is one, unless the whole process was stalled meanwhile. So the
-    time is that which a watcher has seen pass.
-
-    :param now: the steady time.
-    :param patience: s after which the reader counts as hung.
-    """
-
-    def __init__(self, now: Callable[[], float], patience: float = PATIENCE) -> None:
-        self._now = now
-        self._patience = patience
-        self._write: object | None = None
-
-    def __enter__(self) -> None:
-        self._write = object()
-
-    def __exit__(self, *_: object) -> None:
-        self._write = None
-
-    def watch(self) -> Callable[[], bool]:
-        """
-        Return a function that, called every :data:`MOMENT`, returns whether the reader hangs.
-
-        It has not been taken for so long that it never will be.
-        """
-        watched, seen, looked = self._write, 0.0, self._now()
-
-        def nobody() -> bool:
-            nonlocal watched, seen, looked
-            now, write = self._now(), self._write
-            passed, looked = min(now - looked, 2.0 * MOMENT), now
-            seen = seen + passed if write is watched else 0.0
-            watched = write
-            return write is not None and seen > self._patience
-        return nobody
-
+from drive_can_bridge.process.write_watch import MOMENT, WriteWatch
 
 #: bytes that wait for a reader at most
 QUEUE_MAX = 1 << 20
@@ -104,7 +57,7 @@ class Output:
         self._dropped = 0
         self._ending = False
         self._changed = threading.Condition()
-        self._taking = Taking(clock.now)
+        self._taking = WriteWatch(clock.now)
 
     def __enter__(self) -> 'Output':
         try:
@@ -145,11 +98,11 @@ class Output:
         """
         if self._real < 0:
             return True
-        nobody = self._taking.watch()
+        hangs = self._taking.watch()
         with self._changed:
             while not self._changed.wait_for(
                     lambda: not (self._size or self._dropped or self._unread()), MOMENT):
-                if nobody() or deadline is not None and self._now() > deadline:
+                if hangs() or deadline is not None and self._now() > deadline:
                     return False
         return True
 

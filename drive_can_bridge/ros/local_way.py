@@ -18,10 +18,11 @@ from rcl_interfaces.srv import (
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlCompleted
+from drive_can_bridge.host_texts import is_pattern
 from drive_can_bridge.process.local_server import LocalRequest, LocalServer
 from drive_can_bridge.process.local_stop import does_not_answer
 from drive_can_bridge.process.local_way import (
-    ANYWHERE, is_pattern, meant, Rubbish, value_of, value_text)
+    ANYWHERE, meant, Rubbish, value_of, value_text)
 from drive_can_bridge.process.presence import in_namespace, Presence, switched_on
 from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.ros.drive_node import DriveNode

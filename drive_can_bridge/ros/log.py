@@ -35,7 +35,7 @@ from typing import Any
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.process.standard_outputs import MOMENT, Taking
+from drive_can_bridge.process.write_watch import MOMENT, WriteWatch
 
 #: times that a line is written at once before it is summed up
 FEW = 5
@@ -324,7 +324,7 @@ class Log:
         self._limit = LogLimit(self._put, self._wake, clock.now)
         self._dropped = 0
         self._closed = False
-        self._taking = Taking(clock.now, PATIENCE)
+        self._taking = WriteWatch(clock.now, PATIENCE)
         self._thread = clock.worker(self._run, 'log')
         self._thread.start()
 
@@ -355,8 +355,8 @@ class Log:
         self._limit.sum_up(all_of_it=True)
         self._closed = True
         self._lines.put(_END, always=True)
-        nobody = self._taking.watch()
-        while self._thread.is_alive() and not nobody():
+        hangs = self._taking.watch()
+        while self._thread.is_alive() and not hangs():
             self._thread.join(MOMENT)
 
     def _put(self, level: LogLevel, text: str) -> None:

@@ -19,8 +19,8 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.process.local_server import LocalRequest
 from drive_can_bridge.process.local_stop import Answer
 from drive_can_bridge.process.local_way import PASSING_PERIOD
-from drive_can_bridge.ros.client.control import StopRequests
-from drive_can_bridge.ros.client.search import LOOK_PERIOD
+from drive_can_bridge.ros.client.drive_commands import StopRequests
+from drive_can_bridge.ros.client.graph import LOOK_PERIOD
 from drive_can_bridge.ros.rcl.end import TopicEnd
 from drive_can_bridge.ros.rcl.extension import GONE
 

@@ -13,7 +13,7 @@ from scripted_drive import (
 
 from drive_can_bridge.backup.restore import PATIENCE, RestoreResult
 from drive_can_bridge.core.profile import RestoreTable
-from drive_can_bridge.process.signals import postponed
+from drive_can_bridge.process.critical_sections import postponed
 
 #: mode, three settings, mode
 WRITES = range(1, 6)

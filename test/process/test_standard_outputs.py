@@ -17,7 +17,8 @@ import time
 from clocks import HandClock
 import pytest
 
-from drive_can_bridge.process.standard_outputs import MOMENT, Output, PATIENCE, Taking
+from drive_can_bridge.process.standard_outputs import Output
+from drive_can_bridge.process.write_watch import MOMENT, PATIENCE, WriteWatch
 
 pytestmark = pytest.mark.usefixtures('threads')
 
@@ -154,7 +155,7 @@ def test_last_words_wait_until_they_are_taken_unless_nobody_takes_them(
 
 
 def test_a_process_that_stood_still_says_nothing_about_its_reader(hand: Time) -> None:
-    taking = Taking(hand.clock.now)
+    taking = WriteWatch(hand.clock.now)
     with taking:
         nobody = taking.watch()
         for _ in range(3):      # SIGSTOP, a virtual machine that was moved, ...

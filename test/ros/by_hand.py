@@ -15,7 +15,7 @@ from drive_can_bridge.process import local_stop
 from drive_can_bridge.process.local_server import LocalRequest
 from drive_can_bridge.process.local_way import Inbound, packets_of, VERSION
 from drive_can_bridge.process.presence import bridges, Present, SWITCH
-from drive_can_bridge.ros.client import calls, search
+from drive_can_bridge.ros.client import client_node, search
 
 Run = Callable[..., tuple[int, list[str], str]]
 
@@ -42,7 +42,7 @@ def no_way(*_: Any) -> Any:
 
 def no_ros(patch: pytest.MonkeyPatch) -> None:
     """Let no command become part of the graph."""
-    patch.setattr(calls.ClientNode, '__init__', no_way)
+    patch.setattr(client_node.ClientNode, '__init__', no_way)
 
 
 class Line:

@@ -25,7 +25,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import DriveCanError, SilentBridge, WhichBridge
 from drive_can_bridge.core.parameters import AccessMode, Storage
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.ros.client import calls, search
+from drive_can_bridge.ros.client import calls, graph, search
 
 PUMP: dict[str, Any] = {
     'bus': 'main', 'protocol': 'canopen_pkw', 'station': 5, 'profile': 'tesys_t_ltmr',
@@ -256,16 +256,16 @@ def test_an_answer_that_is_lost_is_asked_for_again(
         client.node.create_service(
             kind, f'/forgetful/{name}', answers(name) if forgets else lambda _, given: given,
             qos_profile=qos_profile_parameters, callback_group=ReentrantCallbackGroup())
-    here = search.Graph(clock())
+    here = graph.Graph(clock())
     try:
         here.call('/forgetful', 'list_parameters', ListParameters.Request())
         assert asked['list_parameters'] == 2
         # what changes something is not done twice
-        with pytest.raises(search.NoAnswer, match='does not answer for 1 s') as caught:
+        with pytest.raises(graph.NoAnswer, match='does not answer for 1 s') as caught:
             here.call('/forgetful', 'set_parameters', SetParameters.Request(), 1.0)
         assert caught.value.asked
         assert asked['set_parameters'] == 1
-        with pytest.raises(search.NoAnswer) as caught:
+        with pytest.raises(graph.NoAnswer) as caught:
             here.call('/nobody', 'set_parameters', SetParameters.Request(), 1.0)
         assert not caught.value.asked
     finally:
@@ -274,7 +274,7 @@ def test_an_answer_that_is_lost_is_asked_for_again(
 
 @pytest.mark.parametrize('asked', [True, False])
 def test_a_write_that_nobody_answers_is_in_doubt_once_it_was_sent(asked: bool) -> None:
-    trouble = search.NoAnswer('/lift has gone', asked=asked)
+    trouble = graph.NoAnswer('/lift has gone', asked=asked)
 
     def call(*_: Any) -> None:
         raise trouble
@@ -282,7 +282,7 @@ def test_a_write_that_nobody_answers_is_in_doubt_once_it_was_sent(asked: bool) -
     unasked: Any = None
     drive = BridgedDrive('lift', way, '/lift', {RAMP.name: RAMP}, {}, unasked)
     told: list[Any] = []
-    with pytest.raises(search.NoAnswer):
+    with pytest.raises(graph.NoAnswer):
         drive.write({RAMP.name: 1.5}, told=told.append)
     assert [outcome.reason.code for outcome in told] == ['write_not_confirmed'] * asked
 

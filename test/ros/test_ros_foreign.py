@@ -16,8 +16,9 @@ from waiting import clock
 
 from drive_can_bridge.core.errors import SilentBridge
 from drive_can_bridge.monitor.snapshot import OperationOutcome, StopAction as StopKind
-from drive_can_bridge.ros.client.control import StopRequests
-from drive_can_bridge.ros.client.search import find_bridges, find_drives, Graph
+from drive_can_bridge.ros.client.drive_commands import StopRequests
+from drive_can_bridge.ros.client.graph import Graph
+from drive_can_bridge.ros.client.search import find_bridges, find_drives
 from drive_can_bridge.ros.monitor.client import ServiceOperations
 
 CYCLONE = bytes.fromhex('0110a1b2c3d4e5f60718293a00001304')

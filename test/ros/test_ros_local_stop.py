@@ -12,7 +12,7 @@ from by_hand import Lines, no_ros, Run
 from clients import Client, wait_until
 import pytest
 
-from drive_can_bridge.cli import control
+from drive_can_bridge.cli import hand
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import DriveCanError
@@ -148,7 +148,7 @@ def test_one_that_hangs_is_named_though_ros_takes_long_to_begin(
         except DriveCanError:
             joined.append(False)
             raise
-    monkeypatch.setattr(control, '_ros', slow)
+    monkeypatch.setattr(hand, '_ros', slow)
     assert run('stop') == (1, [hung, 'lift: ready'], '')
     assert 1.0 <= bench.clock.now() - began < 1.1
     wait_until(lambda: joined)
@@ -159,7 +159,7 @@ def test_without_ros_a_bridge_that_hangs_has_its_second_and_is_named(
         run: Run, hung: str, bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     def no_way(*_: Any) -> Any:
         raise DriveCanError('no ROS')
-    monkeypatch.setattr(control, '_ros', no_way)
+    monkeypatch.setattr(hand, '_ros', no_way)
     began = bench.clock.now()
     assert run('stop') == (1, [hung, 'lift: ready'], '')
     assert 1.0 <= bench.clock.now() - began < 1.1
@@ -176,7 +176,7 @@ def test_whatever_keeps_ros_from_beginning_what_is_known_without_is_told(
     one.online()
     older = Presence(one.context.get_domain_id(), '/b/bridge')
     locally(one)
-    monkeypatch.setattr(control, '_ros', no_way)
+    monkeypatch.setattr(hand, '_ros', no_way)
     try:
         code, lines, errors = run('stop')
     finally:
@@ -203,7 +203,7 @@ def test_where_the_way_through_ros_fails_midway_what_is_known_without_is_told(
     older = Presence(one.context.get_domain_id(), '/b/bridge')
     locally(one)
     node = SimpleNamespace(leave=lambda: None)
-    monkeypatch.setattr(control, '_ros', lambda *_: (
+    monkeypatch.setattr(hand, '_ros', lambda *_: (
         SimpleNamespace(client_node=node), SimpleNamespace(StopRequests=Stop)))
     try:
         code, lines, errors = run('stop')

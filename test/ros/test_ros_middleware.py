@@ -40,7 +40,7 @@ print(allocated() - before, flush=True)
 os._exit(0)
 """
 CLIENT = """
-from drive_can_bridge.ros.client.calls import ClientNode
+from drive_can_bridge.ros.client.client_node import ClientNode
 ClientNode('client').leave()
 """
 

@@ -8,39 +8,22 @@ asked. So before the first call another one is made that changes nothing, throug
 made later, until it is answered: endpoints are announced in order, so that a server which knows
 the later one knows the earlier ones of this node, too. Nor has this side found all services of a
 node when it has found one: what is sent to one that it does not know yet is lost.
-
-Topics without an executor: looked into when the view is drawn anew.
-
-An executor wakes for every message and makes a Python object of it. A view wants the newest few a
-second; the middleware's own queue of depth one throws the others away at next to no cost.
 """
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 import math
-import os
-import sys
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from rcl_interfaces.srv import (
     DescribeParameters, GetParameters, GetParameterTypes, ListParameters, SetParameters,
 )
-from rclpy.context import Context
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import SetBool, Trigger
 
-from drive_can_bridge.core import sentences
-from drive_can_bridge.core.errors import DriveCanError
-from drive_can_bridge.core.sentences import client_by_rclpy
-from drive_can_bridge.core.text import printable
-from drive_can_bridge.process.environment import domain_problem
+from drive_can_bridge.ros.client.client_node import HasEnd
 from drive_can_bridge.ros.client.foreign import foreign
-from drive_can_bridge.ros.rcl.end import Names, TopicEnd
 
-# What makes messages from their definitions comes with every type support, is used by none, and
-# its import takes 0.15 s; the package works without it where it is missing.
-sys.modules.setdefault('rosidl_generator_py.generate_py_impl', None)    # type: ignore[arg-type]
 #: what is asked of a node to know that it knows us: of no parameter
 GREETING = 'get_parameter_types', GetParameterTypes
 #: s after which a greeting is repeated for the first time; then twice as many, up to the second
@@ -71,70 +54,6 @@ _FRESH = 2.0
 Done = Callable[[Any], None]
 #: called instead where the request was not even sent: nothing was done
 Unasked = Callable[[], None]
-
-
-class ClientNode:
-    """
-    This process in the ROS graph.
-
-    It is no :class:`rclpy.node.Node`: that one has topics and services of its own, and what they
-    need takes longer to be imported (0.25 s) than all requests of a command take to be
-    answered.
-
-    :param purpose: part of the node's name.
-    :ivar end: its clients, subscriptions and publishers.
-    :ivar full_name: of the node in the graph.
-    :raises DriveCanError: ROS does not start.
-    """
-
-    def __init__(self, purpose: str) -> None:
-        why = domain_problem()
-        if why:
-            raise DriveCanError(sentences.ros_does_not_start(why=why))
-        self.context = Context()
-        # a leading underscore hides a node from "ros2 node list"
-        name = f'_drive_can_{purpose}_{os.getpid()}'
-        self.full_name = f'/{name}'
-        try:
-            # no signals, and no log file: a stop has to work where nothing can be written
-            self.context.init([], initialize_logging=False)
-            self.end = TopicEnd(self.context, name, _tell_slow)
-        except Exception as error:  # rcl fails in several types
-            reason = str(error).partition(', at ')[0]
-            raise DriveCanError(sentences.ros_does_not_start(why=reason)) from error
-
-    @property
-    def open(self) -> bool:
-        """Whether it is still in the graph."""
-        return bool(self.context.ok())
-
-    def services(self) -> Names:
-        """Return all services that have been discovered, with their types."""
-        return self.end.services()
-
-    def topics(self) -> Names:
-        """Return all topics that have been discovered, with their types."""
-        return self.end.topics()
-
-    def servers(self, service: str) -> int:
-        """Return how many servers of this name are discovered."""
-        return self.end.servers(service)
-
-    def leave(self) -> None:
-        """Leave the graph. Idempotent."""
-        if self.context.ok():
-            self.end.close()
-            self.context.try_shutdown()
-
-
-class HasEnd(Protocol):
-    """A client node, or another node with an end of its own."""
-
-    end: TopicEnd
-
-
-def _tell_slow(reason: str) -> None:
-    print(f'drive_can: {printable(client_by_rclpy(reason), None)}', file=sys.stderr, flush=True)
 
 
 @dataclass(slots=True)
@@ -428,66 +347,3 @@ def _made_with(service: str) -> Iterable[str]:
 
 def _nothing(_: Any) -> None:
     pass
-
-
-#: messages taken at once; what is left waits for the next look
-_BATCH = 200
-
-
-def newest_quality() -> QoSProfile:
-    """Return what suits values of which only the newest counts; no publisher waits for us."""
-    return QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-
-
-def log_quality() -> QoSProfile:
-    """Return what suits ``/rosout``: recent lines are delivered to late joiners, too."""
-    return QoSProfile(depth=_BATCH, reliability=ReliabilityPolicy.RELIABLE,
-                      durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-
-def undemanding_quality() -> QoSProfile:
-    """Return the quality of a subscription that matches every publisher."""
-    return QoSProfile(depth=_BATCH, reliability=ReliabilityPolicy.BEST_EFFORT)
-
-
-class NewestPublisher:
-    """A publisher of the newest message only."""
-
-    def __init__(self, node: HasEnd, message_type: Any, topic: str) -> None:
-        self._writing = node.end.writing(message_type, topic, QoSProfile(depth=1))
-
-    def publish(self, message: Any) -> None:
-        """Publish a message."""
-        self._writing.publish(message)
-
-    def close(self) -> None:
-        """Destroy the publisher."""
-        self._writing.close()
-
-
-class Inbox:
-    """
-    A subscription whose messages are polled.
-
-    :param take: called with each message.
-    """
-
-    def __init__(self, node: HasEnd, message_type: Any, topic: str, quality: QoSProfile,
-                 take: Callable[[Any], None]) -> None:
-        self._take = take
-        self._reading = node.end.reading(message_type, topic, quality)
-
-    def look(self) -> None:
-        """Deliver the messages that have arrived."""
-        for _ in range(_BATCH):
-            try:
-                message = self._reading.take()
-            except RuntimeError:  # any publisher may send malformed bytes
-                continue
-            if message is None:
-                return
-            self._take(message)
-
-    def close(self) -> None:
-        """Unsubscribe."""
-        self._reading.close()

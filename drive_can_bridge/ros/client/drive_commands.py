@@ -22,9 +22,12 @@ from drive_can_bridge.process.local_stop import (
 from drive_can_bridge.process.local_way import meant
 from drive_can_bridge.process.orders import CONTROL_TIMEOUT, SERVICES, unanswered, unoffered
 from drive_can_bridge.process.presence import Present, short
-from drive_can_bridge.ros.client.calls import HasEnd, Inbox, NodeCalls, OFFER_TIMEOUT, Service
+from drive_can_bridge.ros.client.calls import NodeCalls, OFFER_TIMEOUT, Service
+from drive_can_bridge.ros.client.client_node import HasEnd
 from drive_can_bridge.ros.client.foreign import why_not
-from drive_can_bridge.ros.client.search import find_bridges, find_drives, Graph, Search, Seeing
+from drive_can_bridge.ros.client.graph import Graph
+from drive_can_bridge.ros.client.search import find_bridges, find_drives, Search, Seeing
+from drive_can_bridge.ros.client.subscriptions import Inbox
 from drive_can_bridge.ros.rcl.quality import latched_quality
 from drive_can_bridge.ros.recognition import drives_among, namespace_of
 

@@ -13,7 +13,8 @@ from typing import Any
 from rclpy.qos import QoSProfile
 
 from drive_can_bridge.process.presence import bridges, Present, short
-from drive_can_bridge.ros.client.calls import HasEnd, Inbox
+from drive_can_bridge.ros.client.client_node import HasEnd
+from drive_can_bridge.ros.client.subscriptions import Inbox
 
 #: s for which a sign counts
 RECENT = 3.0

@@ -28,10 +28,11 @@ from drive_can_bridge.core.text import is_ros_name, printable
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import OperationOutcome, Place, Status, StopAction
 from drive_can_bridge.monitor.values import BUDGET, ParameterInfo, SamplingPlan
-from drive_can_bridge.ros.client.calls import (
-    ClientNode, HasEnd, Inbox, log_quality, newest_quality, NodeCalls, Service)
-from drive_can_bridge.ros.client.control import CONTROL_TIMEOUT, STOP_AGAIN, STOP_TIMEOUT
+from drive_can_bridge.ros.client.calls import NodeCalls, Service
+from drive_can_bridge.ros.client.client_node import ClientNode, HasEnd
+from drive_can_bridge.ros.client.drive_commands import CONTROL_TIMEOUT, STOP_AGAIN, STOP_TIMEOUT
 from drive_can_bridge.ros.client.foreign import why_not
+from drive_can_bridge.ros.client.subscriptions import Inbox, log_quality, newest_quality
 from drive_can_bridge.ros.messages import (
     drive_value, facts_of, limits_of, parameter_message, plain)
 from drive_can_bridge.ros.rcl.quality import latched_quality
