@@ -5,8 +5,61 @@ from collections.abc import Callable
 from functools import partial
 import heapq
 from itertools import count
+from typing import Protocol
 
 from conversation import Conversation
+
+#: steps of a while: what takes more does not end
+STEPS_MAX = 20_000
+
+
+class Timed(Protocol):
+    """What has a time of its own (s)."""
+
+    now: float
+
+
+class Coming:
+    """What is on its way: what happens, and when."""
+
+    def __init__(self) -> None:
+        self._steps: list[tuple[float, int, Callable[[], object]]] = []
+        self._number = count()
+
+    def __bool__(self) -> bool:
+        return bool(self._steps)
+
+    def plan(self, at: float, step: Callable[[], object]) -> None:
+        heapq.heappush(self._steps, (at, next(self._number), step))
+
+    def clear(self) -> None:
+        self._steps.clear()
+
+    def arrives(self) -> None:
+        """Let the first of it happen, whatever the time is."""
+        heapq.heappop(self._steps)[2]()
+
+    def live(self, of: Timed, end: float, *, due: Callable[[], float],
+             timers: Callable[[], object], then: Callable[[], object] = lambda: None) -> None:
+        """
+        Let time pass: what arrives goes before timers of the same moment.
+
+        :param of: has the time; what is on its way at the end arrives later.
+        :param due: says when the next timer is due, which ``timers`` then serves.
+        :param then: called behind everything that happens.
+        """
+        for _ in range(STEPS_MAX):
+            timer_at = max(of.now, due())
+            if self._steps and self._steps[0][0] <= min(timer_at, end):
+                of.now = max(of.now, self._steps[0][0])
+                self.arrives()
+            elif timer_at <= end:
+                of.now = timer_at
+                timers()
+            else:
+                return
+            then()
+        raise AssertionError('a timer is never done')
 
 
 class Timeline:
@@ -23,12 +76,11 @@ class Timeline:
         self.talk = talk
         self.answer = answer
         self.log: list[tuple[float, str]] = []
-        self._coming: list[tuple[float, int, Callable[[float], list[str]]]] = []
-        self._number = count()
+        self._coming = Coming()
 
     def plan(self, at: float, step: Callable[[float], list[str]]) -> None:
         """Have something happen: (now) -> what was sent."""
-        heapq.heappush(self._coming, (round(at, 6), next(self._number), step))
+        self._coming.plan(round(at, 6), lambda: self.took(step(self.talk.now)))
 
     def took(self, sent: list[str]) -> None:
         """Have the drive hear what was sent just now."""
@@ -42,15 +94,9 @@ class Timeline:
 
     def live(self, end: float) -> None:
         """Let time pass; what is on its way at the end arrives later."""
-        while True:
-            due = max(self.talk.now, self.talk.session.next_timer())
-            if self._coming and self._coming[0][0] <= min(due, end):
-                at, _, step = heapq.heappop(self._coming)
-                self.took(step(at))
-            elif due <= end:
-                self.took(self.talk.at(due))
-            else:
-                return
+        talk = self.talk
+        self._coming.live(talk, end, due=talk.session.next_timer,
+                          timers=lambda: self.took(talk.at(talk.now)))
 
     def when(self, *texts: str) -> list[float]:
         """Return when any of these frames was sent."""

@@ -8,8 +8,8 @@ and is named as one that may; one that heard it is not, whatever got lost before
 
 from collections.abc import Sequence
 from dataclasses import replace
-import heapq
-from itertools import count, product
+from functools import partial
+from itertools import product
 import math
 from typing import Any
 
@@ -18,6 +18,7 @@ from drives import CannordDrive, ExtendedDrive, Motor, MotorServo
 from extent import some
 import pytest
 from stops import UNANSWERED_CYCLES
+from timeline import Coming
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
@@ -76,8 +77,7 @@ class Bus:
         self.deaf: set[int] = set()
         self.lose = 0           # so many answers get lost
         self.held_until = -math.inf     # by a gateway, which then lets them go
-        self.coming: list[tuple[float, int, int, Frame]] = []
-        self.number = count()
+        self.coming = Coming()
         self.sent: list[tuple[float, Frame]] = []
         for session in self.sessions:
             session.bus_up(self.now)
@@ -103,24 +103,22 @@ class Bus:
             if self.lose > 0:
                 self.lose -= 1
             else:
-                heapq.heappush(self.coming, (
-                    max(self.now + self.delay, self.held_until), next(self.number), index, each))
+                self.coming.plan(max(self.now + self.delay, self.held_until), partial(
+                    self.arrives, self.sessions[index], each))
+
+    def arrives(self, session: Session, answer: Frame) -> None:
+        session.receive_frame(answer, self.now)
 
     def live(self, seconds: float) -> None:
         end = self.now + seconds
-        while True:
-            due = max(self.now, min(session.next_timer() for session in self.sessions))
-            if self.coming and self.coming[0][0] <= min(due, end):
-                self.now, _, index, answer = heapq.heappop(self.coming)
-                self.sessions[index].receive_frame(answer, self.now)
-            elif due <= end:
-                self.now = due
-                for session in self.sessions:
-                    session.handle_timer(self.now)
-            else:
-                self.now = end
-                return
-            self.look()
+        self.coming.live(
+            self, end, due=lambda: min(session.next_timer() for session in self.sessions),
+            timers=self.timers, then=self.look)
+        self.now = end
+
+    def timers(self) -> None:
+        for session in self.sessions:
+            session.handle_timer(self.now)
 
     def run(self) -> None:
         leader = self.sessions[0]

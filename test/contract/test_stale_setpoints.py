@@ -6,13 +6,13 @@ The process stands still for less than a second, and hears then, at once, what a
 answers that let the session go on, before any timer has run.
 """
 
-import heapq
-from itertools import count
+from functools import partial
 
 from builders import GAIN, RAMP, read
 from extent import some
 from partners import Partner, PARTNERS
 import pytest
+from timeline import Coming
 
 TIMEOUT = 0.2
 #: s that an answer takes: long enough to be under way when the process stops
@@ -24,39 +24,30 @@ class Bus:
 
     def __init__(self, partner: Partner) -> None:
         self.partner, self.talk = partner, partner.talk
-        self.coming: list[tuple[float, int, str]] = []
-        self.number = count()
+        self.coming = Coming()
         self.sent: list[tuple[float, str]] = []
 
     def took(self, sent: list[str]) -> None:
         for text in sent:
             self.sent.append((self.partner.now, text))
             for answer in self.partner.answers(text):
-                heapq.heappush(self.coming, (self.partner.now + DELAY, next(self.number), answer))
+                self.coming.plan(self.partner.now + DELAY, partial(self.arrives, answer))
+
+    def arrives(self, text: str) -> None:
+        self.took(self.talk.hears(text, self.partner.now))
 
     def live(self, end: float) -> None:
-        partner = self.partner
-        while True:
-            due = max(partner.now, self.talk.session.next_timer())
-            if self.coming and self.coming[0][0] <= min(due, end):
-                partner.now, _, text = heapq.heappop(self.coming)
-                self.took(self.talk.hears(text, partner.now))
-            elif due <= end:
-                partner.now = due
-                self.took(self.talk.at(due))
-            else:
-                partner.now = end
-                return
+        partner, talk = self.partner, self.talk
+        self.coming.live(partner, end, due=talk.session.next_timer,
+                         timers=lambda: self.took(talk.at(partner.now)))
+        partner.now = end
 
     def stall(self, seconds: float) -> None:
         """Stand still; then the reader goes first, with all that has arrived, and goes on."""
-        partner = self.partner
-        partner.now += seconds
+        self.partner.now += seconds
         for _ in range(30):
-            if not self.coming:
-                return
-            _, _, text = heapq.heappop(self.coming)
-            self.took(self.talk.hears(text, partner.now))
+            if self.coming:
+                self.coming.arrives()
 
 
 @pytest.mark.parametrize('seconds', [0.25, 0.5, 0.9])

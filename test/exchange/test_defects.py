@@ -8,8 +8,8 @@ session of the first, or in what its listener is told.
 
 from collections.abc import Callable
 from dataclasses import replace
-import heapq
-from itertools import count, product
+from functools import partial
+from itertools import product
 from typing import Any
 
 from builders import ACTUAL, CONTROL, CURRENT, drive, frame, LIMIT, SPEED, STATUS, WORD
@@ -17,6 +17,7 @@ from drives import CannordDrive, ExtendedDrive, Motor, PkwNode, StandardDrive
 from exchange_builders import Bench
 from extent import some
 import pytest
+from timeline import Coming
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlRequest
@@ -87,8 +88,7 @@ class World:
         configurations, self.devices = kinds[kind]()
         self.group = 'group' in kind
         self.bench = Bench(*configurations)
-        self.coming: list[tuple[float, int, Frame]] = []
-        self.number = count()
+        self.coming = Coming()
         self.frames: list[str] = []
         self.deaf = False
         self.bench.now = 10.0
@@ -110,8 +110,8 @@ class World:
                 if self.deaf or not self._is_for(sent, index):
                     continue
                 for answer in device.takes(sent):
-                    heapq.heappush(self.coming, (
-                        self.bench.now + DELAY, next(self.number), answer))
+                    self.coming.plan(self.bench.now + DELAY, partial(
+                        self.exchange.frame_received, answer, 0.0))
 
     def _is_for(self, sent: Frame, index: int) -> bool:
         device, station = self.devices[index], index + 1
@@ -125,22 +125,17 @@ class World:
         return True
 
     def live(self, seconds: float) -> None:
-        end = self.bench.now + seconds
-        for _ in range(100_000):
-            at = min(member.due for member in self.exchange._members)
-            at = min(max(at, self.bench.now), self.bench.now + PERIOD)
-            if self.coming and self.coming[0][0] <= min(at, end):
-                self.bench.now, _, answer = heapq.heappop(self.coming)
-                self.exchange.frame_received(answer, 0.0)
-            elif at <= end:
-                self.bench.now = at
-                with self.exchange.lock:
-                    self.exchange._pass()
-            else:
-                self.bench.now = end
-                return
-            self.took()
-        raise AssertionError('the exchange spins')
+        bench = self.bench
+        end = bench.now + seconds
+        self.coming.live(
+            bench, end, then=self.took, timers=self.timers,
+            due=lambda: min(bench.now + PERIOD, *(
+                member.due for member in self.exchange._members)))
+        bench.now = end
+
+    def timers(self) -> None:
+        with self.exchange.lock:
+            self.exchange._pass()
 
     def ask(self, index: int, action: ControlAction) -> None:
         session = self.bench.sessions[index]
