@@ -7,9 +7,10 @@ what DDS does, signals, buses of the kernel, threads that wait for a time of thi
 Where that follows from what a test uses, its fixtures (:data:`FIXTURES`) or its mark ``socketcan``
 say so; otherwise the test has the mark ``real``. They run one after the other: in ``make test``
 those of :data:`CHOSEN`, each executable and each fact about the machine once; in ``.ci/run`` the
-others, too, which have the mark ``ci``: there those of :data:`FIXTURES`, which are about what
-commands show, beside all others. As a program it prints the files of all; with the word
-``commands`` of those, with ``rest`` of the others, with ``executables`` the stories of those.
+others, too, which have the mark ``ci``: there the stories of ``system/`` in one run, and beside it
+all others in another one, which takes about as long. As a program it prints the files of all; with
+the word ``system`` of those, with ``others`` of the others, with ``executables`` the stories of
+those.
 """
 
 from pathlib import Path
@@ -100,7 +101,8 @@ def part(word: str) -> list[str]:
     if word == 'executables':
         return list(EXECUTABLES)
     return [file for file in files(everything=True)
-            if word not in ('commands', 'rest') or (file in FIXTURES) == (word == 'commands')]
+            if word not in ('system', 'others')
+            or file.startswith('test/system/') == (word == 'system')]
 
 
 if __name__ == '__main__':

@@ -25,6 +25,6 @@ def test_what_is_chosen_is_short() -> None:
 
 
 def test_none_is_lost_between_the_two_parts() -> None:
-    commands, rest = part('commands'), part('rest')
-    assert sorted(commands + rest) == files(everything=True) == part('')
-    assert commands and not any(file.startswith(tuple(commands)) for file in rest)
+    system, others = part('system'), part('others')
+    assert sorted(system + others) == files(everything=True) == part('')
+    assert len(system) > 10 and FIXTURES.keys() <= {*others}
