@@ -27,7 +27,7 @@ Nothing in here asks a session what it owes, and no codec of the package is used
 """
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, count, islice, product
 import math
@@ -36,23 +36,16 @@ import sys
 import time
 from typing import Any
 
-from builders import (
-    ACTUAL, CONTROL, CURRENT, drive, frame, INT16, parameter, SPEED, STATUS, TARGET_VELOCITY,
-    TESYS, TESYS_CONTROL, TESYS_SPEED, TESYS_STATUS, TESYS_WORD, WORD,
-)
-from drives import (
-    CannordDrive, ExtendedDrive, Motor, MotorServo, PkwNode, ServoDrive, StandardDrive,
-)
+from builders import frame
+from drives import Motor, PkwNode, ServoDrive, StandardDrive
+from kinds import KINDS, PERIOD
 from timeline import Coming
 
-from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import Noted, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.families import make_sessions
 
-PERIOD = 0.05
 #: s until a frame is answered, and by a drive that is late
 PROMPT, LATE = 0.002, 1.4 * PERIOD
 #: s that a drive is talked to until it has to stand
@@ -66,139 +59,6 @@ SLACK = 0.12
 COMMAND_TIMEOUT = 0.5
 #: raw and physical value of the setpoint that users want, and how often they say so (s)
 RAW, VALUE, COMMANDED_EVERY = 50, 5.0, 0.1
-
-FREQUENCY = parameter('frequency_setpoint', None, type=INT16, scale=0.1, unit='Hz')
-
-
-class StayingServo(MotorServo):
-    """
-    CiA 402: stays in quick stop active, with 606Ch at its last value, until it is sent 0000h.
-
-    So does the fake slave of ros2_canopen with Lely core 2.4.0, though its 605Ah is 2, and
-    CANopenNode 4 without a 605Ah. It brakes for so many looks at it, SYNCs and reads of 6041h.
-    """
-
-    stays = True
-    brakes = 40
-
-    def __init__(self, node: int, motor: Motor) -> None:
-        super().__init__(node, motor)
-        self.objects.update({(0x606C, 0): b'\x64\0\0\0', (0x6064, 0): bytes(4)})
-
-    def becomes(self, state: int) -> None:
-        if state == self.QUICK_STOP != self.state:
-            self.braking = self.brakes
-        super().becomes(state)
-
-    def runs_down(self) -> None:
-        if self.state == self.QUICK_STOP and self.braking:
-            place = self.number(0x6064) + 100
-            self.objects[0x6064, 0] = place.to_bytes(4, 'little')
-        super().runs_down()
-
-
-class OptionlessServo(StayingServo):
-    """The same without a 605Ah."""
-
-    def __init__(self, node: int, motor: Motor) -> None:
-        super().__init__(node, motor)
-        del self.objects[0x605A, 0]
-
-
-@dataclass(frozen=True)
-class Kind:
-    """
-    A kind of drive, or group of them.
-
-    :ivar maps: somebody may change them, and the bridge looks.
-    :ivar unseen: s after a restart for which nobody can know of it: where its word, or a setpoint
-        without one, is sent all the time. docs/safety.md names that.
-    """
-
-    configure: Callable[[], list[DriveConfiguration]]
-    make: Callable[[Callable[[bool, bool], object], int], Any]
-    unseen: float = 0.0
-    maps: bool = False
-
-
-def _extended(*, slot: bool = False, control: bool = True, **options: Any) -> Kind:
-    more: tuple[Parameter, ...] = (WORD,) if slot else ()
-    return Kind(
-        lambda: [drive('datamodel_extended', control=CONTROL if control else None, period=PERIOD,
-                       request=(SPEED, *more), response=(ACTUAL, CURRENT, STATUS), **options)],
-        lambda moved, _: ExtendedDrive(Motor(
-            {**dict(zip(range(122, 130), (50, 52 * slot, 0, 0, 209, 210, 211, 0))),
-             52: 0, 209: 0, 210: 0}, word=52 if control else None, moved=moved)),
-        unseen=4 * PERIOD if slot or not control else 0.0,
-        maps=options.get('mapping') != 'assume')
-
-
-def _standard(*, slot: bool = False, control: bool = True) -> Kind:
-    more: tuple[Parameter, ...] = (WORD,) if slot else ()
-    return Kind(
-        lambda: [drive('datamodel_standard', control=CONTROL if control else None, period=PERIOD,
-                       request=(SPEED, *more), response=(ACTUAL, CURRENT, STATUS))],
-        lambda moved, _: StandardDrive(Motor(
-            {52: 0, 209: 0, 210: 0}, word=52 if control else None, moved=moved)),
-        unseen=0.005 if control else math.inf)
-
-
-def _pkw(*, slot: bool = False, control: bool = True) -> Kind:
-    more = (TESYS_WORD,) if slot else ()
-    return Kind(
-        lambda: [drive('canopen_pkw', station=5, table=TESYS, period=0.1,
-                       control=TESYS_CONTROL if control else None,
-                       request=(TESYS_SPEED, *more), response=(TESYS_STATUS,),
-                       parameter_timeout=0.2, refresh_interval=0.3)],
-        lambda moved, _: PkwNode(5, Motor(
-            {704: 0}, setpoint=710, word=704 if control else None, status=455,
-            bits=(1, 0x80, 4), moved=moved)),
-        unseen=0.11 if slot else 0.0)
-
-
-def _cannord(members: int = 1) -> Kind:
-    return Kind(
-        lambda: [drive('cannord', name=f'drive_{station}', station=station, table=(FREQUENCY,),
-                       request=(FREQUENCY,), response=(), period=PERIOD,
-                       broadcast='group' if members > 1 else 'none')
-                 for station in range(1, members + 1)],
-        lambda moved, index: CannordDrive(
-            index + 1, Motor(moved=moved), *[0x400] * (members > 1)),
-        unseen=4 * PERIOD * members)
-
-
-def _servo(make: type[MotorServo] = MotorServo, **options: Any) -> Kind:
-    return Kind(
-        lambda: [drive('cia402', mode='pv', table=(TARGET_VELOCITY,), request=(TARGET_VELOCITY,),
-                       response=(), period=PERIOD, parameter_timeout=0.1, heartbeat_producer=0.0,
-                       heartbeat_timeout=0.0, **options)],
-        lambda moved, index: make(index + 1, Motor(moved=moved)))
-
-
-KINDS: dict[str, Kind] = {
-    '29 bit, word by number': _extended(),
-    '29 bit, word in its slot': _extended(slot=True),
-    '29 bit, no word': _extended(control=False),
-    '29 bit, maps assumed': _extended(mapping='assume'),
-    '29 bit, maps assumed, word in its slot': _extended(slot=True, mapping='assume'),
-    '29 bit, maps configured': _extended(mapping='configure'),
-    '29 bit, maps configured, word in its slot': _extended(slot=True, mapping='configure'),
-    '11 bit, word by number': _standard(),
-    '11 bit, word with its setpoints': _standard(slot=True),
-    '11 bit, no word': _standard(control=False),
-    'PKW, word by number': _pkw(),
-    'PKW, word with its setpoints': _pkw(slot=True),
-    'PKW, no word': _pkw(control=False),
-    'CiA 402': _servo(),
-    'CiA 402, mapping assumed': _servo(mapping='assume'),
-    'CiA 402, disabled by shutdown': _servo(disable_word='shutdown'),
-    'CiA 402, by event': _servo(transmission='event'),
-    'CiA 402, stays in quick stop': _servo(StayingServo),
-    'CiA 402, stays in quick stop, no 605Ah': _servo(OptionlessServo),
-    'CANnord': _cannord(),
-    'CANnord, group of two': _cannord(2),
-    'CANnord, group of four': _cannord(4),
-}
 
 #: what may happen, and how many s pass then
 THINGS = ('run', 'enable', 'zero', 'quiet', 'disable', 'quick_stop', 'silent', 'mute', 'late',

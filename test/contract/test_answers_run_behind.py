@@ -7,70 +7,38 @@ and is named as one that may; one that heard it is not, whatever got lost before
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import product
 import math
 from typing import Any
 
-from builders import ACTUAL, CONTROL, CURRENT, drive, frame, SPEED, STATUS, TARGET_VELOCITY, WORD
-from drives import CannordDrive, ExtendedDrive, Motor, MotorServo
+from builders import frame
 from extent import some
+import kinds
 import pytest
 from stops import UNANSWERED_CYCLES
 from timeline import Coming
 
-from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import AnswerLate, Event, FrameRejected, Noted
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.families import make_sessions
 
-
-def _extended(period: float, *, slot: bool, **options: Any,
-              ) -> tuple[list[DriveConfiguration], list[Any]]:
-    return [drive(period=period, request=(SPEED, WORD) if slot else (SPEED,),
-                  response=(ACTUAL, CURRENT, STATUS), control=CONTROL if slot else None,
-                  parameter_timeout=0.2, **options)], [ExtendedDrive(Motor(
-                      {**dict(zip(range(122, 130), (50, 52 * slot, 0, 0, 209, 210, 211, 0))),
-                       52: 0, 209: 0, 210: 0}, word=52 if slot else None))]
-
-
-def _cannord(period: float, members: int = 1) -> tuple[list[DriveConfiguration], list[Any]]:
-    broadcast = 'group' if members > 1 else 'none'
-    return [drive('cannord', name=f'drive_{station}', station=station, request=(SPEED,),
-                  response=(ACTUAL,), period=period, broadcast=broadcast)
-            for station in range(1, members + 1)], [
-        CannordDrive(station, Motor(), *[0x400] * (members > 1))
-        for station in range(1, members + 1)]
-
-
-def _servo(period: float) -> tuple[list[DriveConfiguration], list[Any]]:
-    return [drive('cia402', mode='pv', table=(TARGET_VELOCITY,), request=(TARGET_VELOCITY,),
-                  response=(), period=period, parameter_timeout=0.2, heartbeat_producer=0.0,
-                  heartbeat_timeout=0.0)], [MotorServo(1, Motor())]
-
-
-KINDS = {
-    'cia402': _servo,
-    'cannord': _cannord,
-    'cannord group of two': lambda period: _cannord(period, 2),
-    'cannord group of four': lambda period: _cannord(period, 4),
-    '29 bit': lambda period: _extended(period, slot=False),
-    '29 bit, word in a slot': lambda period: _extended(period, slot=True),
-    '29 bit, setpoint only': lambda period: _extended(period, slot=False, mapping='assume'),
-    '29 bit, maps assumed': lambda period: _extended(period, slot=True, mapping='assume'),
-}
+KINDS = ('CiA 402', 'CANnord', 'CANnord, group of two', 'CANnord, group of four',
+         '29 bit, no word', '29 bit, word in its slot', '29 bit, no word, maps assumed',
+         '29 bit, maps assumed, word in its slot')
 
 
 class Bus:
     """Sessions that share a bus, and drives whose answers take a while."""
 
     def __init__(self, kind: str, period: float, delay: float, missed_limit: int = 3) -> None:
-        configurations, self.devices = KINDS[kind](period)
-        self.sessions: Sequence[Session] = make_sessions([
-            replace(each, missed_limit=missed_limit) for each in configurations])
+        configurations = kinds.KINDS[kind].configure(
+            period=period, missed_limit=missed_limit, parameter_timeout=0.2)
+        self.devices = [kinds.KINDS[kind].make(lambda begins, moves: None, index)
+                        for index in range(len(configurations))]
+        self.sessions: Sequence[Session] = make_sessions(configurations)
         self.events: list[list[Event]] = [[] for _ in self.sessions]
         self.delay = delay
         self.now = 10.0
@@ -162,7 +130,7 @@ LAGS = [(period, lag * period) for period in (0.01, 0.05) for lag in (
 #: longer than what sets up a servo waits for an answer
 LONG_LAGS = [(0.15, 0.4), (0.2, 0.45)]
 BEHIND = some([(kind, *lag) for kind in KINDS for lag in (*LAGS, *LONG_LAGS)
-               if kind != 'cia402' or lag in LAGS], 3)
+               if kind != 'CiA 402' or lag in LAGS], 3)
 
 
 @pytest.mark.parametrize(('kind', 'period', 'delay'), BEHIND)
@@ -238,8 +206,8 @@ def test_one_that_hears_nothing_gets_up_to_three_more(kind: str) -> None:
     bus.deaf = set(range(len(bus.devices)))
     bus.sent.clear()
     bus.stop()
-    cycles = '400' if 'group' in kind else '002' if 'cannord' in kind else '003FFFF0'
-    cycles = '201' if kind == 'cia402' else cycles
+    cycles = '400' if 'group' in kind else '002' if 'CANnord' in kind else '003FFFF0'
+    cycles = '201' if kind == 'CiA 402' else cycles
     assert len([
         each for _, each in bus.sent if str(each).startswith(f'{cycles}#')]) == UNANSWERED_CYCLES
 
@@ -247,7 +215,7 @@ def test_one_that_hears_nothing_gets_up_to_three_more(kind: str) -> None:
 @pytest.mark.parametrize('members', [2, 4])
 def test_members_that_did_not_answer_get_frames_of_their_own(members: int) -> None:
     """Two are deaf to broadcasts and to three cycles of the stop."""
-    bus = Bus(f'cannord group of {"two" if members == 2 else "four"}', 0.02, 0.002)
+    bus = Bus(f'CANnord, group of {"two" if members == 2 else "four"}', 0.02, 0.002)
     bus.run()
     deaf = {0, members - 1}
     bus.deaf = set(deaf)
@@ -268,7 +236,7 @@ def test_members_that_did_not_answer_get_frames_of_their_own(members: int) -> No
 @pytest.mark.parametrize('refused', ['002', '004', '006', '008'])
 def test_members_that_a_broadcast_alone_started_are_named(refused: str) -> None:
     """The bus takes the broadcast that starts them all, and no frame of a member."""
-    bus = Bus('cannord group of four', 0.02, 0.002)
+    bus = Bus('CANnord, group of four', 0.02, 0.002)
     leader = bus.sessions[0]
     leader.services.submit(ControlRequest(ControlAction.ENABLE), bus.now)
     while not bus.devices[1].registers.runs:
@@ -294,7 +262,7 @@ def test_members_that_a_broadcast_alone_started_are_named(refused: str) -> None:
 @pytest.mark.parametrize('members', ['two', 'four'])
 def test_a_group_whose_answers_take_longer_than_a_period_comes_online(
         members: str, delay: float) -> None:
-    bus = Bus(f'cannord group of {members}', 0.02, delay)
+    bus = Bus(f'CANnord, group of {members}', 0.02, delay)
     bus.run()
     assert not any(isinstance(event, FrameRejected)
                    for events in bus.events for event in events)
@@ -328,7 +296,7 @@ def test_what_was_held_until_a_stop_does_not_show_it(
 @pytest.mark.parametrize(('held', 'longer'), [(0.25, 0.15), (0.65, 0.3), (1.5, 0.8), (1.5, 1.2)])
 def test_what_was_held_until_a_quick_stop_does_not_show_it(held: float, longer: float) -> None:
     for place in some(range(5), 5):
-        bus = Bus('29 bit, setpoint only', 0.1, 0.002, 30)
+        bus = Bus('29 bit, no word, maps assumed', 0.1, 0.002, 30)
         bus.run()
         bus.run_on(0.02 * place)
         bus.held_until = bus.now + held + longer
@@ -362,7 +330,7 @@ def test_what_was_lost_until_a_stop_is_no_doubt(
 def test_what_was_lost_until_a_quick_stop_is_no_doubt(
         period: float, limit: int, lost: int) -> None:
     for place in some(range(5), 5):
-        bus = Bus('29 bit, setpoint only', period, 0.002, limit)
+        bus = Bus('29 bit, no word, maps assumed', period, 0.002, limit)
         bus.run()
         bus.run_on(0.2 * place * period)
         bus.lose = 1000
@@ -378,7 +346,10 @@ def test_what_was_lost_until_a_quick_stop_is_no_doubt(
 # -- late answers are counted, and are no sign of a second station --------------------------------
 
 
-@pytest.mark.parametrize('kind', ['cannord', '29 bit', '29 bit, maps assumed'])
+SINGLE = ['CANnord', '29 bit, no word', '29 bit, maps assumed, word in its slot']
+
+
+@pytest.mark.parametrize('kind', SINGLE)
 def test_late_answers_are_counted_and_told_once_in_a_while(kind: str) -> None:
     bus = Bus(kind, 0.02, 0.002)
     bus.events[0].clear()
@@ -404,7 +375,7 @@ def test_late_answers_are_counted_and_told_once_in_a_while(kind: str) -> None:
     assert len(told) == 2
 
 
-@pytest.mark.parametrize('kind', ['cannord', '29 bit', '29 bit, maps assumed'])
+@pytest.mark.parametrize('kind', SINGLE)
 def test_at_most_one_for_each_missed_exchange(kind: str) -> None:
     """A second station answers, too: that is rejected."""
     bus = Bus(kind, 0.02, 0.002)
@@ -412,7 +383,7 @@ def test_at_most_one_for_each_missed_exchange(kind: str) -> None:
     bus.lose = 2
     bus.live(0.2)
     assert (statistics.missed, statistics.late, statistics.rejected) == (2, 0, 0)
-    twice = {'cannord': '003#310B0000'}.get(kind, '103FFFF0#0000000000010000')
+    twice = {'CANnord': '003#310B0000'}.get(kind, '103FFFF0#0000000000010000')
     for _ in range(5):
         bus.live(0.001)
         bus.sessions[0].receive_frame(frame(twice), bus.now)
@@ -423,7 +394,7 @@ def test_at_most_one_for_each_missed_exchange(kind: str) -> None:
 
 
 @pytest.mark.parametrize(('held', 'missed'), [(0.28, 2), (0.7, 6), (1.5, 14), (4.0, 39)])
-@pytest.mark.parametrize('kind', ['cannord', '29 bit, maps assumed'])
+@pytest.mark.parametrize('kind', ['CANnord', '29 bit, maps assumed, word in its slot'])
 def test_answers_that_were_held_are_late_however_late(
         kind: str, held: float, missed: int) -> None:
     bus = Bus(kind, 0.1, 0.002)
@@ -434,7 +405,7 @@ def test_answers_that_were_held_are_late_however_late(
     assert (statistics.missed, statistics.late, statistics.rejected) == (missed, missed, 0)
 
 
-@pytest.mark.parametrize('kind', ['cannord', '29 bit, maps assumed'])
+@pytest.mark.parametrize('kind', ['CANnord', '29 bit, maps assumed, word in its slot'])
 def test_what_was_missed_long_ago_hides_no_second_station(kind: str) -> None:
     bus = Bus(kind, 0.1, 0.002)
     bus.deaf = {0}
@@ -444,7 +415,7 @@ def test_what_was_missed_long_ago_hides_no_second_station(kind: str) -> None:
     statistics = bus.sessions[0].statistics
     rejected, late = statistics.rejected, statistics.late
     assert (rejected, late) == (0, 0)
-    twice = {'cannord': '003#310B0000'}.get(kind, '103FFFF0#0000000000010000')
+    twice = {'CANnord': '003#310B0000'}.get(kind, '103FFFF0#0000000000010000')
     for _ in range(20):
         bus.live(0.1)
         bus.sessions[0].receive_frame(frame(twice), bus.now)
