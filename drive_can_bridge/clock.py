@@ -27,7 +27,7 @@ Item = TypeVar('Item')
 
 
 class WakeEvent(Protocol):
-    """Wakes one sleeper. A ring while nobody sleeps is kept for the next; several count once."""
+    """Wakes one sleeper. A ring without a sleeper is kept for the next; several count once."""
 
     def wait(self, until: float = math.inf) -> bool:
         """Sleep until then, or until a ring; return whether there was one."""

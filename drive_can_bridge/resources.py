@@ -57,7 +57,7 @@ def command_that_brings(extra: str) -> str:
     from importlib.metadata import PackageNotFoundError, requires
     try:
         entries = [entry.partition(';') for entry in requires(_PACKAGE) or ()]
-    except PackageNotFoundError:    # sources that nobody installed
+    except PackageNotFoundError:    # sources, not installed
         entries = []
     needed = [entry.strip() for entry, _, condition in entries
               if condition.strip().endswith((f"'{extra}'", f'"{extra}"'))]

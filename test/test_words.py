@@ -15,7 +15,8 @@ ROOT = Path(__file__).resolve().parents[1]
 BANNED = {r'\banew\b': 'again, restart', r'\bwhoever\b': 'each … that',
           r'\bfor who\b': 'for those who'}
 #: words that no docstring begins with: those that do
-HEADS = {'Tell': 'Return (whether), Report', 'Take': 'Handle, Record', 'Say': 'Return, Report'}
+HEADS = {'Tell': 'Return (whether), Report', 'Take': 'Handle, Record', 'Say': 'Return, Report',
+         'Have': 'Make, Run, Start', 'Let': 'Allow, Make', 'Somebody': 'a user, another node'}
 PAGES = sorted({ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', ROOT / 'CHANGELOG.rst',
                 *(ROOT / 'docs').glob('*.md')} - {ROOT / 'docs' / 'messages.md'})
 
@@ -45,13 +46,14 @@ def test_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert wrong_in(capsys.readouterr().out) == []
 
 
-def test_heads_of_docstrings() -> None:
-    wrong = [
-        f'{source}:{node.lineno}: {text.splitlines()[0]}'
-        for source in sorted((ROOT / 'drive_can_bridge').rglob('*.py'))
-        for node in ast.walk(ast.parse(source.read_text(encoding='utf-8')))
-        if isinstance(node, (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef))
-        and (text := ast.get_docstring(node) or '').split(' ', 1)[0] in HEADS]
+def test_docstrings() -> None:
+    wrong = []
+    for source in sorted((ROOT / 'drive_can_bridge').rglob('*.py')):
+        for node in ast.walk(ast.parse(source.read_text(encoding='utf-8'))):
+            if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)):
+                text = ast.get_docstring(node) or ''
+                found = [*wrong_in(text), *HEADS.get(text.split(' ', 1)[0], '').splitlines()]
+                wrong += [f'{source}:{getattr(node, "lineno", 1)}: {each}' for each in found]
     assert wrong == []
 
 

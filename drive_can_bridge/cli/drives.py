@@ -86,7 +86,7 @@ def by_short_names(args: Namespace, words: Sequence[str]) -> list[str]:
     found = []
     for word in words:
         place, slash, name = word.rpartition('/')
-        if slash and args.params_file is None:  # nobody knows where the drives of a file will be
+        if slash and args.params_file is None:  # where a file's drives will run is unknown
             with suppress(ArgumentTypeError):   # else it is none, which is reported
                 where = namespace(place)
                 if args.namespace not in (None, where):

@@ -19,10 +19,10 @@ import sys
 from typing import Any
 
 from drive_can_bridge import __version__
-from drive_can_bridge.compiled import build
 from drive_can_bridge.cli.command import complain, FAILED, Parser, WRONG_USAGE, WrongUsage
 from drive_can_bridge.cli.completion import complete, typed
 from drive_can_bridge.clock import Clock, SteadyClock
+from drive_can_bridge.compiled import build
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.text import nearest

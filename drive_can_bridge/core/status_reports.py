@@ -238,7 +238,7 @@ def stuck_text(reports: StatusReports, table: ControlTable, wording: Wording | N
     :param sending: what the current control word is for.
     :param pulsed: the pulse that resets a fault has left.
     :param acknowledged: ``sent`` says that the drive has acknowledged the word.
-    :param fault: which one it is, if somebody knows.
+    :param fault: which one it is, if that is known.
     :param more: what the family knows.
     """
     if pulsed and reports.answered:
@@ -263,7 +263,7 @@ def stuck_text(reports: StatusReports, table: ControlTable, wording: Wording | N
 
 
 def success_text(table: ControlTable, sending: ControlAction, state: str) -> Sentence:
-    """Name the state reached, or say that nobody knows."""
+    """Return the state reached, or that it is not reported."""
     return (sentences.state_not_reported(sending.value) if table.enabled is None else
             sentences.state_reached(state))
 

@@ -64,7 +64,7 @@ class Happened(Enum):
     LOST = 'it was online, and has not answered often enough'
     UNANSWERED = 'its cycles since it was lost were not answered, either'
     MAPS_DIFFER = 'its maps are not those that its cycles are made for'
-    STARTED = 'the conversation begins anew: start, bus back, stall, restart'
+    STARTED = 'the conversation restarts: start, bus back, stall, restart'
     SHOWED_UP = 'an offline drive gives a sign of life'
     ENDS = 'the activation ends'
     LEFT_ALONE = 'nothing more will be sent: the end, or a lost bus'

@@ -4,8 +4,8 @@ Locks that all processes of this host respect, of any user.
 
 A lock is a socket in the abstract name space of Linux, bound to a name that is made of its key.
 The kernel lets one process have a name, and takes it away when that process ends, however it ends.
-There is no file: none that is left behind, that another user may not write, that somebody has put
-a symbolic link in the place of, or that a service with a ``/tmp`` of its own does not see. The
+There is no file: none that is left behind, that another user may not write, that was replaced by
+a symbolic link, or that a service with a ``/tmp`` of its own does not see. The
 names belong to the network namespace, as CAN interfaces do.
 
 Beside each lock its holder has a second name that identifies it; ``/proc/net/unix`` shows it to

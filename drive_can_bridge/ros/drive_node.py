@@ -82,7 +82,7 @@ class DriveNode(DriveListener):
         self.joint_commands: PolledTopics | None = None
         self.witness: Callable[[Event], None] | None = None
         self._spinner = spinner
-        self._log = log.speaker(drive.name)
+        self._log = log.source(drive.name)
         self._log.reset()
         self._asked: dict[Request | ControlRequest, Completed] = {}
         self._services: list[CoroutineServices] = []
@@ -383,7 +383,7 @@ class DriveNode(DriveListener):
         self._log.info(asked, topic=f'asked {request.action.value}')
 
     def _armed(self, name: str) -> None:
-        """Have the executor log who has armed a setpoint: asking the graph takes a moment."""
+        """Log in the executor who has armed a setpoint: asking the graph takes a moment."""
         now = self._now()
         if now >= self._tell_armed_at.get(name, now):
             self._tell_armed_at[name] = now + _TELL_ARMED

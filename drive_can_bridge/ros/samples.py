@@ -3,9 +3,9 @@
 Publish samples: the fast path from a decoded frame to the ROS graph.
 
 Runs in the thread that received the frame, up to thousands of times a second. So messages are
-prepared as bytes in which only the numbers change (:mod:`.prepared`), and what nobody subscribes
-to is not built at all: the subscription counts are looked up every ``COUNT_PERIOD``, not for every
-message.
+prepared as bytes in which only the numbers change (:mod:`.prepared`), and what has no
+subscriber is not built at all: the subscription counts are looked up every ``COUNT_PERIOD``,
+not for every message.
 """
 
 from collections.abc import Callable, Sequence

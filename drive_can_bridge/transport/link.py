@@ -401,7 +401,7 @@ class Link:
         """
         Block until the bus accepts a frame; discard those received: all drives are lost.
 
-        :raises BusUnavailable: the bus is lost, or has to be opened anew to find out.
+        :raises BusUnavailable: the bus is lost, or has to be opened again to find out.
         """
         if port.has_room is None:
             raise BusUnavailable(reason)

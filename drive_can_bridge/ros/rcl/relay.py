@@ -33,7 +33,7 @@ class Relay:
 
             def answer(response: Any) -> None:
                 future.set_result(response)
-                # Executors sleep over what somebody else completes: this wakes it. It looks at all
+                # Executors sleep over what others complete: this wakes it. It looks at all
                 # of its tasks before it comes to one of a task's: the response was sent by then.
                 self._later(self._later, answered)
             begin(request, answer)
