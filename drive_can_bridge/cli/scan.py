@@ -52,7 +52,7 @@ _SEND_TIMEOUT = 0.05
 _REFUSED_MAX = 5
 
 
-class Survey:
+class BusScan:
     """
     What is found on one bus.
 
@@ -366,52 +366,52 @@ def _scan(args: Namespace, bus: BusConfiguration) -> int:
     with Ownership([(bus, ())], 'drive_can scan', END_FIRST):
         port = open_port(bus, args.clock)
         try:
-            survey = Survey(bus, port, args.clock.now)
+            scan = BusScan(bus, port, args.clock.now)
             with waiting('listening' if args.passive else 'listening, then asking'):
-                survey.listen(args.listen)
-                asked = [] if args.passive else _ask(args, survey)
+                scan.listen(args.listen)
+                asked = [] if args.passive else _ask(args, scan)
         finally:
             port.close()
-    if survey.master:
-        complain(command_sentences.only_listening(master=survey.master))
-    _tell_trouble(survey, port, asked=not args.passive)
-    _show(args, survey)
-    _tell_left_out(args, survey, asked)
-    if args.output is not None and not survey.sightings:
+    if scan.master:
+        complain(command_sentences.only_listening(master=scan.master))
+    _tell_trouble(scan, port, asked=not args.passive)
+    _show(args, scan)
+    _tell_left_out(args, scan, asked)
+    if args.output is not None and not scan.sightings:
         complain(command_sentences.no_file_without_drives(output=args.output))
     elif args.output is not None:
         for path in write_parameter_file(
-                args.output, bus, survey.sightings,
-                [survey.scanners[each.protocol].settings(each.station)
-                 for each in survey.sightings], survey.nodes):
+                args.output, bus, scan.sightings,
+                [scan.scanners[each.protocol].settings(each.station)
+                 for each in scan.sightings], scan.nodes):
             complain(f'written: {path}')
         complain(f'next: drive_can validate {shlex.quote(str(args.output))}')
-    elif survey.sightings:
+    elif scan.sightings:
         complain(f'next: {_command(args)} -o found.yaml')
-    return 0 if survey.sightings or survey.nodes else FAILED
+    return 0 if scan.sightings or scan.nodes else FAILED
 
 
-def _ask(args: Namespace, survey: Survey) -> list[str]:
+def _ask(args: Namespace, scan: BusScan) -> list[str]:
     """Ask the stations of the families; return the families that were asked."""
     asked = []
-    for name in [*(each for each in FAMILIES if survey.scanners[each].unmistakable),
+    for name in [*(each for each in FAMILIES if scan.scanners[each].unmistakable),
                  *args.protocols]:
-        if not survey.master and not survey.forbidden(survey.scanners[name]):
+        if not scan.master and not scan.forbidden(scan.scanners[name]):
             asked.append(name)
-            survey.ask(name)
-        if survey.forbidden(survey.scanners[name]):
+            scan.ask(name)
+        if scan.forbidden(scan.scanners[name]):
             complain(command_sentences.not_asked_beside_canopen(
-                name=name, nodes=', '.join(map(str, survey.nodes))))
+                name=name, nodes=', '.join(map(str, scan.nodes))))
     return asked
 
 
-def _tell_left_out(args: Namespace, survey: Survey, asked: Sequence[str]) -> None:
+def _tell_left_out(args: Namespace, scan: BusScan, asked: Sequence[str]) -> None:
     """Print the bit rate, and what was not asked, and how to ask it."""
     left = [name for name in FAMILIES if name not in asked]
-    told = f'{args.bitrate} bit/s, {survey.frames} frames heard'
+    told = f'{args.bitrate} bit/s, {scan.frames} frames heard'
     if args.passive:
         told += '; nothing was asked: --passive'
-    elif left and not survey.master and not survey.nodes and not survey.trouble:
+    elif left and not scan.master and not scan.nodes and not scan.trouble:
         told += (f'; not asked: {", ".join(left)}: their reads may be commands to other devices '
                  f'({_command(args)} --protocols {left[0]})')
     elif left:
@@ -430,8 +430,8 @@ def _command(args: Namespace) -> str:
     return shlex.join(words)
 
 
-def _show(args: Namespace, survey: Survey) -> None:
-    sightings = survey.sightings
+def _show(args: Namespace, scan: BusScan) -> None:
+    sightings = scan.sightings
     if args.json:
         print_json(*({'protocol': each.protocol, 'station': each.station,
                       'certainty': each.certainty.value, 'text': each.text}
@@ -441,14 +441,14 @@ def _show(args: Namespace, survey: Survey) -> None:
     rows = [(each.protocol, str(each.station), each.certainty.value, each.text)
             for each in sightings]
     rows += [('CANopen node', str(node), '–', text)
-             for node, text in sorted(survey.nodes.items()) if node not in drives]
+             for node, text in sorted(scan.nodes.items()) if node not in drives]
     if rows:
         print('\n'.join(column_lines(_COLUMNS, rows, numbers=('station',))))
     else:
-        print(command_sentences.no_drive_found(frames=survey.frames))
+        print(command_sentences.no_drive_found(frames=scan.frames))
 
 
-def _tell_trouble(survey: Survey, port: EndPoint, *, asked: bool) -> None:
+def _tell_trouble(scan: BusScan, port: EndPoint, *, asked: bool) -> None:
     """Print what is wrong with a bus, as far as it can be seen from here."""
     if port.error_frames:
         error = port.last_error
@@ -456,9 +456,9 @@ def _tell_trouble(survey: Survey, port: EndPoint, *, asked: bool) -> None:
         complain(command_sentences.error_frames_seen(count=port.error_frames, told=told))
     if port.controller:
         complain(command_sentences.controller_state(controller=port.controller))
-    if survey.trouble:
-        complain(command_sentences.scan_trouble(trouble=survey.trouble))
-    elif not survey.frames and not port.error_frames:
+    if scan.trouble:
+        complain(command_sentences.scan_trouble(trouble=scan.trouble))
+    elif not scan.frames and not port.error_frames:
         complain(command_sentences.nothing_answered() if asked
                  else command_sentences.nothing_heard())
 
@@ -472,14 +472,14 @@ def _compare_bitrates(args: Namespace, bus: BusConfiguration) -> int:
             port = open_port(replace(bus, bitrate=rate, options={
                 **bus.options, 'listen_only': True}), args.clock)
             try:
-                survey = Survey(bus, port, args.clock.now)
-                survey.listen(args.listen)
+                scan = BusScan(bus, port, args.clock.now)
+                scan.listen(args.listen)
             finally:
                 port.close()
-        heard += survey.frames
-        print(f'{rate} bit/s: {survey.frames} frames, {port.error_frames} error frames'
-              + ('' if not survey.sightings else ': ' + ', '.join(
-                  f'{each.protocol} {each.station}' for each in survey.sightings)))
+        heard += scan.frames
+        print(f'{rate} bit/s: {scan.frames} frames, {port.error_frames} error frames'
+              + ('' if not scan.sightings else ': ' + ', '.join(
+                  f'{each.protocol} {each.station}' for each in scan.sightings)))
     if not heard:
         complain(command_sentences.nothing_at_any_rate())
     return 0 if heard else FAILED

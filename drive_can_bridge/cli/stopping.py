@@ -102,9 +102,9 @@ def answers(local: LocalStop, ros: WithoutRos | None, namespace: str | None,
              if known and not any(matches(word, node) for node in nodes)]
     own = any(each.domain in (None, local.domain) for each in local.present)
     if not known and (not told or not own and ros is not None):
-        from drive_can_bridge.process.environment import nobody     # takes its time
+        from drive_can_bridge.process.environment import no_bridge     # takes its time
         # those of other domains may be all that there are, or discovery was too slow
-        told.append(Answer('', bool(told), nobody(namespace), bridge=True))
+        told.append(Answer('', bool(told), no_bridge(namespace), bridge=True))
     return told or [Answer(name, False, host_texts.has_no_drives, bridge=True)
                     for name in known]
 

@@ -75,7 +75,7 @@ class BusConversation:
              for drive in drives],
             self, clock, counted=[route for _, route in self._requests], note=self._note)
         for session in self.sessions.values():
-            self._exchange.attach(session, _Ears(self))
+            self._exchange.attach(session, _SessionListener(self))
         self._exchange.serve()
         self._exchange.open()
         try:
@@ -181,7 +181,7 @@ class BusConversation:
         self._fail(kind(sentences.bus_because(bus=bus, reason=reason)))
 
 
-class _Ears(DriveListener):
+class _SessionListener(DriveListener):
     """The listener of one session: only completed requests matter."""
 
     def __init__(self, conversation: BusConversation) -> None:

@@ -27,7 +27,7 @@ RESET_CYCLES = 3
 _STOPS = (ControlAction.DISABLE, ControlAction.QUICK_STOP)
 
 
-class Disregard:
+class StopNotFollowed:
     """
     Notices a condition that lasts.
 
@@ -140,7 +140,7 @@ class ControlMachine:
         self.fault_text = ''
         self._reached = False                   # enabled was confirmed for this enable word
         self._seen_enabled: set[str] = set()    # which members reported it, knowing that word
-        self._disregard = Disregard(timeout)
+        self._disregard = StopNotFollowed(timeout)
         self._operation: Operation | None = None
         self._answers = ControlAnswers()
         self.take_completed = self._answers.take

@@ -26,7 +26,7 @@ from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.requests import Failure, FailureKind, ReadRequest, ReadValue
 
 
-class Desk(Protocol):
+class ReadRequests(Protocol):
     """Accepts read requests."""
 
     def submit(self, request: ReadRequest, now: float) -> None:
@@ -49,7 +49,7 @@ class Watched(Protocol):
         """Whether its own status reports a fault."""
 
     @property
-    def services(self) -> Desk:
+    def services(self) -> ReadRequests:
         """Where reads of the fault number are requested."""
 
 

@@ -75,7 +75,7 @@ def activate_command() -> str:
             if sys.prefix != sys.base_prefix and script.is_file() else '')
 
 
-def nobody(namespace: str | None, silent: Sequence[str] = (), waited: float = 0.0) -> str:
+def no_bridge(namespace: str | None, silent: Sequence[str] = (), waited: float = 0.0) -> str:
     """
     Return that there is no bridge, or none that answers.
 

@@ -46,7 +46,7 @@ def stop_answer(node: str, success: bool, message: str, online: bool) -> Answer:
                   said if online else host_texts.not_online_may_run.format(said=said))
 
 
-class _Told:
+class _AskedBridge:
     """
     A bridge of this host, with its answers to a stop.
 
@@ -180,13 +180,13 @@ class LocalStop:
         self._waited_before = 0.0
         question = ['stop', ANYWHERE if namespace is None else namespace, *self._words]
         everywhere = not words and namespace is None
-        self._told = [_Told(each, question) for each in bridges()
+        self._asked = [_AskedBridge(each, question) for each in bridges()
                       if everywhere or each.domain in (None, self.domain)
                       and each.may_be_in(namespace)]
         #: connections by which stops are passed on
-        self._passing: list[_Told] = []
+        self._passing: list[_AskedBridge] = []
         if switched_on():
-            for each in self._told:
+            for each in self._asked:
                 if each.present.domain is not None:
                     each.ask()
 
@@ -195,11 +195,11 @@ class LocalStop:
         if self._began is None:
             self._began = now - self._waited_before
         waited = now - self._began
-        for each in (*self._told, *self._passing):
+        for each in (*self._asked, *self._passing):
             if each.busy and waited < PATIENCE:
                 each.ask()
             each.look()
-        if waited >= SOON or not any(each.quiet for each in self._told):
+        if waited >= SOON or not any(each.quiet for each in self._asked):
             self._pass_on()
         for each in self._passing:
             each.give_up(now)
@@ -210,7 +210,7 @@ class LocalStop:
     def wait(self, timeout: float) -> bool:
         """Wait until something arrives, for so many s at most; return whether it did."""
         poll = select.poll()
-        for each in (*self._told, *self._passing):
+        for each in (*self._asked, *self._passing):
             if each.line is not None and each.line.believed:
                 poll.register(each.line.socket, select.POLLIN)
         return bool(poll.poll(1e3 * timeout))
@@ -222,19 +222,19 @@ class LocalStop:
     def over(self, now: float) -> bool:
         """Return whether nothing more is to be expected of this host."""
         waited = self._waited(now)
-        if waited < PATIENCE and (any(each.quiet for each in self._told)
+        if waited < PATIENCE and (any(each.quiet for each in self._asked)
                                   or any(each.busy for each in self._passing)):
             return False
         return waited > STOP_TIMEOUT + PATIENCE or not any(
             each.line is not None and (each.here or each.passed is not None)
-            for each in (*self._told, *self._passing))
+            for each in (*self._asked, *self._passing))
 
     def _waited(self, now: float) -> float:
         return 0.0 if self._began is None else now - self._began
 
     def wants_ros(self, now: float) -> bool:
         """Return whether there may be bridges that only ROS reaches, or that are silent."""
-        own = [each for each in self._told if each.present.domain in (None, self.domain)]
+        own = [each for each in self._asked if each.present.domain in (None, self.domain)]
         if any(each.quiet for each in own) and self._waited(now) < SOON:
             return False
         return (not self._knows_own_domain or not all(each.here for each in own)
@@ -243,7 +243,7 @@ class LocalStop:
     @property
     def _left_to_ros(self) -> bool:
         """Whether the local way does not reach a bridge, or a stop was not passed on."""
-        return (any(each.unreached for each in self._told
+        return (any(each.unreached for each in self._asked
                     if each.present.domain in (None, self.domain))
                 or any(each.failed for each in self._passing
                        if each.present.domain == self.domain))
@@ -251,13 +251,13 @@ class LocalStop:
     @property
     def _knows_own_domain(self) -> bool:
         """Whether a bridge has listed the bridges in the domain of this shell."""
-        return any(each.here and each.present.domain == self.domain for each in self._told)
+        return any(each.here and each.present.domain == self.domain for each in self._asked)
 
     def _pass_on(self) -> None:
         """Pass the stop on to bridges of other hosts, by bridges that know them."""
-        for each in self._told:
+        for each in self._asked:
             domain = each.present.domain
-            same = [other for other in self._told if other.present.domain == domain]
+            same = [other for other in self._asked if other.present.domain == domain]
             local = {other.present.name for other in same}
             asked = {name for other in self._passing for name in other.seen
                      if other.present.domain == domain}
@@ -265,7 +265,7 @@ class LocalStop:
                      and name not in asked and (
                          self._namespace is None or in_namespace(name, self._namespace))]
             if names:
-                passing = _Told(each.present, [
+                passing = _AskedBridge(each.present, [
                     'pass', *names, '', *(node for other in same for node in other.drives), '',
                     *self._words])
                 passing.seen, passing.passed = names, []
@@ -277,12 +277,12 @@ class LocalStop:
     @property
     def present(self) -> list[Present]:
         """The bridges of this host that may be meant, asked or not."""
-        return [each.present for each in self._told]
+        return [each.present for each in self._asked]
 
     @property
-    def known(self) -> dict[str, _Told]:
+    def known(self) -> dict[str, _AskedBridge]:
         """The bridges in the domain of this shell that have sent their name, by full name."""
-        return {each.name: each for each in self._told
+        return {each.name: each for each in self._asked
                 if each.here and each.present.domain == self.domain}
 
     @property
@@ -295,7 +295,7 @@ class LocalStop:
     @property
     def drives(self) -> list[str]:
         """Full names of all known drives in the domain of this shell."""
-        return [node for each in (*self._told, *self._passing)
+        return [node for each in (*self._asked, *self._passing)
                 if each.present.domain == self.domain for node in each.drives]
 
     @property
@@ -310,7 +310,7 @@ class LocalStop:
                 if present.domain == self.domain and not self._may_be_meant(present)}
 
     def _silent(self) -> list[Present]:
-        return [each.present for each in self._told if not each.here]
+        return [each.present for each in self._asked if not each.here]
 
     def _may_be_meant(self, present: Present) -> bool:
         known = set(self.drives)
@@ -320,7 +320,7 @@ class LocalStop:
     def answers(self) -> list[Answer]:
         """Return the results of drives, and of bridges that others see."""
         found: list[Answer] = []
-        for each in self._told:
+        for each in self._asked:
             domain = None if each.present.domain == self.domain else each.present.domain
             told = [each.answers.get(node, Answer(
                         node, False, host_texts.may_run.format(why='no answer')))
@@ -338,7 +338,7 @@ class LocalStop:
 
     def close(self) -> None:
         """Close the connections."""
-        for each in (*self._told, *self._passing):
+        for each in (*self._asked, *self._passing):
             each.hang_up()
 
 

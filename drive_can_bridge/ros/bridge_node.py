@@ -220,7 +220,7 @@ class BridgeNode(LifecycleNode):
                          start_parameter_services=False, **options)  # NodeParameters has them
         self._steady = clock      # the node has a clock of its own: ROS time
         self.log = Log(self.get_logger(), clock)
-        voice = self.log.speaker('')
+        voice = self.log.source('')
         try:
             nodes.look_at(self)
         except Unfit as error:

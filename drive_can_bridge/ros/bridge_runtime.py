@@ -33,7 +33,7 @@ from drive_can_bridge.process.presence import BRIDGE, Presence
 from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.ros.coroutines import Awaited
-from drive_can_bridge.ros.diagnostics import Attendance, Diagnostics, StatusEntry
+from drive_can_bridge.ros.diagnostics import Diagnostics, PresenceCheck, StatusEntry
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.joints import Joints
 from drive_can_bridge.ros.local_way import LocalWayServer
@@ -63,7 +63,7 @@ class Trigger(Protocol):
         """Start to save."""
 
 
-class Occasions:
+class TraceTriggers:
     """
     Decides what is worth a trace: each fault, loss and error, when it begins.
 
@@ -123,9 +123,9 @@ class FlightWatch:
         wanted = any(bus.trace_seconds > 0.0 for bus in buses)  # else there may be no such place
         folder = Path(str(get_logging_directory())) / 'drive_can_bridge' if wanted else Path()
         self._recorder = FlightRecorder(buses, folder, log.warning, log.error, clock)
-        occasions = self._occasions = Occasions(self._recorder.trigger)
+        triggers = self._triggers = TraceTriggers(self._recorder.trigger)
         #: what else is worth a trace: a bus that is gone, and a diagnostic status
-        self.bus_lost, self.reported = occasions.bus_lost, occasions.reported
+        self.bus_lost, self.reported = triggers.bus_lost, triggers.reported
         self._calls = 0     # that wait for their answer
         self._service = node.create_service(TriggerService, '~/save_trace', self._save,
                                             callback_group=ReentrantCallbackGroup())
@@ -151,7 +151,7 @@ class FlightWatch:
         """Start watching the drives."""
         for drive in drives:
             if drive.drive.bus in self._recorder.buses:
-                drive.witness = partial(_tell, self._occasions, drive)
+                drive.witness = partial(_tell, self._triggers, drive)
 
     def close(self) -> None:
         """Write what is still to be written. The exchanges must be closed."""
@@ -203,12 +203,12 @@ class FlightWatch:
             self._recorder.save(bus, 'save_trace', partial(self._thread.later, written, bus))
 
 
-def _tell(occasions: Occasions, drive: DriveNode, event: Event) -> None:
+def _tell(triggers: TraceTriggers, drive: DriveNode, event: Event) -> None:
     """Pass on an event of a drive, with the bus lock held."""
     if drive.session.active:
-        occasions.drive_told(drive.name, drive.drive.bus, event, drive.session.state)
+        triggers.drive_told(drive.name, drive.drive.bus, event, drive.session.state)
     else:
-        occasions.forget(drive.name)
+        triggers.forget(drive.name)
 
 
 class BridgeRuntime:
@@ -279,8 +279,8 @@ class BridgeRuntime:
                 'diagnostics', configuration.diagnostics_period, self.diagnostics.publish,
                 lambda text: log.error(f'diagnostics: {text}'), clock)
             closing.callback(self._reporting.stop)
-            self._attendance = Attendance(log, list(self.drives.values()), clock)
-            closing.callback(self._attendance.end)
+            self._presence_check = PresenceCheck(log, list(self.drives.values()), clock)
+            closing.callback(self._presence_check.end)
             self._passing = Passing(node, clock, log.warning)
             closing.callback(self._passing.end)
             self.local_way = LocalWayServer(
@@ -351,7 +351,7 @@ class BridgeRuntime:
         """Start the exchange with every drive."""
         for exchange in self.exchanges.values():
             exchange.activate()
-        self._attendance.begin()
+        self._presence_check.begin()
         self._limit_memory()
         self._log.info(sentences.active(
             drives=len(self.drives), buses=counted(len(self.exchanges), 'bus', 'buses')))
@@ -373,7 +373,7 @@ class BridgeRuntime:
         """Stop the drives safely, if they run."""
         with data_limit.room():
             failures = stop_all(self.exchanges.values(), self._clock)
-        self._attendance.end()      # which may be waiting for a bus that hangs
+        self._presence_check.end()      # which may be waiting for a bus that hangs
         for bus, reason in failures.items():
             self._log.error(sentences.stop_frames_not_sent(bus=bus, reason=reason))
 
@@ -417,7 +417,7 @@ class BridgeRuntime:
 
     def bus_opened(self, bus: str) -> None:
         """Log it."""
-        self._log.speaker(f'bus {bus}').info('open')
+        self._log.source(f'bus {bus}').info('open')
 
     def bus_lost(self, bus: str, reason: str) -> None:
         """Log it; at start-up a bus of another process is not waited for."""
@@ -425,12 +425,12 @@ class BridgeRuntime:
             self._misconfigured.append(f'bus {bus}: {reason}')
             return
         again = self.configuration.buses[bus].reconnect_period
-        self._log.speaker(f'bus {bus}').error(with_outlook(reason, again))
+        self._log.source(f'bus {bus}').error(with_outlook(reason, again))
         self._flight.bus_lost(bus)
 
     def bus_told(self, bus: str, text: str) -> None:
         """Log it."""
-        self._log.speaker(f'bus {bus}').warning(text)
+        self._log.source(f'bus {bus}').warning(text)
 
     def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
         """Record that an exchange cannot go on."""

@@ -61,7 +61,7 @@ def absence(drive: DriveNode) -> Sentence:
     return sentences.silent_since(since, what)
 
 
-class Attendance:
+class PresenceCheck:
     """
     Logs once, a while after each activation, which drives were never seen.
 
@@ -102,7 +102,7 @@ class Attendance:
             with drive.exchange.entered() as entered:
                 told = absence(drive) if entered else sentences.bus_hangs(drive.exchange.bus.name)
                 of_drive = entered and drive.exchange.bus_state == 'up'
-            self._log.speaker(drive.name).warning(told if of_drive else sentences.not_seen(told))
+            self._log.source(drive.name).warning(told if of_drive else sentences.not_seen(told))
         online = sum(drive.session.online for drive in self._drives)
         self._log.warning(sentences.drives_missing(
             online, len(self._drives), [drive.name for drive in missing]))

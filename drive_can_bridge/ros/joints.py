@@ -171,9 +171,9 @@ class Joints:
     def __init__(self, node: Node, log: Log, configuration: BridgeConfiguration,
                  drives: Mapping[str, DriveNode], stamps: Stamps, clock: Clock) -> None:
         self._now = clock.now
-        speaker = log.speaker('')
-        speaker.reset()
-        warn = speaker.warn
+        source = log.source('')
+        source.reset()
+        warn = source.warn
         self._taken: list[PolledTopics] = []
         self._states: JointStates | None = None
         self._periodic_task: PeriodicTask | None = None

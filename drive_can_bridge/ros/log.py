@@ -39,15 +39,15 @@ from drive_can_bridge.process.write_watch import MOMENT, WriteWatch
 
 #: times that a line is written at once before it is summed up
 FEW = 5
-#: s between two summaries of a speaker
+#: s between two summaries of a source
 SUM_UP = 10.0
 #: s without a line after which it is news again
 QUIET = 5.0
-#: different lines of a speaker: so many at once, and so many per second
+#: different lines of a source: so many at once, and so many per second
 BURST, RATE = 100, 1.0
-#: the same for all speakers together
+#: the same for all sources together
 BURST_OF_ALL, RATE_OF_ALL = 500, 20.0
-#: lines of a speaker that are remembered
+#: lines of a source that are remembered
 TOPICS_MAX = 256
 #: s after which a logger does not come back. For its first line rclpy looks for the caller in all
 #: modules: that alone takes a second or two on a slow machine
@@ -123,7 +123,7 @@ class _Topic:
         return f'{self.text} ({told}, the last {last})' if last else f'{self.text} ({told})'
 
 
-class Speaker:
+class LogSource:
     """
     A source of lines of the log: one drive, one bus.
 
@@ -282,19 +282,19 @@ class LogLimit:
         #: held lines are not written later: everything is written
         self.over = False
         self.of_all = _Allowance(BURST_OF_ALL, RATE_OF_ALL)
-        self._speakers: dict[str, Speaker] = {}
+        self._sources: dict[str, LogSource] = {}
 
-    def speaker(self, name: str) -> Speaker:
+    def source(self, name: str) -> LogSource:
         """Return the source of this name, always the same."""
         with self.lock:
-            if name not in self._speakers:
-                self._speakers[name] = Speaker(name, self)
-            return self._speakers[name]
+            if name not in self._sources:
+                self._sources[name] = LogSource(name, self)
+            return self._sources[name]
 
     def wait(self) -> float | None:
         """Return the s until :meth:`sum_up` has something to do; None: nothing."""
         with self.lock:
-            due = min((speaker.due for speaker in self._speakers.values()), default=math.inf)
+            due = min((source.due for source in self._sources.values()), default=math.inf)
             return None if due == math.inf else max(0.0, due - self.clock())
 
     def sum_up(self, *, all_of_it: bool = False) -> None:
@@ -305,9 +305,9 @@ class LogLimit:
         """
         with self.lock:
             now, self.over = self.clock(), self.over or all_of_it
-            for speaker in sorted(self._speakers.values(), key=lambda each: each.due):
-                if all_of_it or speaker.due <= now:
-                    speaker.sum_up(now, all_of_it=all_of_it)
+            for source in sorted(self._sources.values(), key=lambda each: each.due):
+                if all_of_it or source.due <= now:
+                    source.sum_up(now, all_of_it=all_of_it)
 
 
 class Log:
@@ -328,9 +328,9 @@ class Log:
         self._thread = clock.worker(self._run, 'log')
         self._thread.start()
 
-    def speaker(self, name: str) -> Speaker:
+    def source(self, name: str) -> LogSource:
         """Return the log of a drive or a bus: its lines begin with the name (if there is one)."""
-        return self._limit.speaker(name)
+        return self._limit.source(name)
 
     def info(self, text: str) -> None:
         """Log what is as it should be."""

@@ -198,7 +198,7 @@ def _run(watcher: SignalWatcher, clock: Clock, arguments: Sequence[str],
         return _complain(f'drive_can_bridge: {in_words(error)}')
     for warning in warnings:
         bridge.log.warning(warning)
-    libraries = bridge.log.speaker('library')
+    libraries = bridge.log.source('library')
     LibraryLogs(partial(libraries.warn, few=FEW), clock.now).install()
     if bridge.is_empty:
         bridge.log.fatal(_nothing_configured(bridge, arguments))

@@ -384,7 +384,7 @@ class Curve:
         return [time for time, _ in found], [value for _, value in found]
 
 
-class Lanes(NamedTuple):
+class BitLanes(NamedTuple):
     """
     A word of named bits: a lane each, from the bottom, in which a set bit is high.
 
@@ -401,7 +401,7 @@ class Lanes(NamedTuple):
             curve.add(time, lane + LANE * (raw >> bit & 1))
 
 
-class Marks:
+class FaultMarks:
     """The faults of a drive: times of missing answers, and periods of faults."""
 
     def __init__(self) -> None:
@@ -457,8 +457,8 @@ class Plotter:
     def __init__(self, configuration: BridgeConfiguration, wanted: Sequence[str],
                  drives: Sequence[DriveConfiguration]) -> None:
         self._curves: dict[tuple[str, str], Curve] = {}
-        self._lanes: dict[tuple[str, str], Lanes] = {}
-        self._marks: dict[str, Marks] = {}
+        self._lanes: dict[tuple[str, str], BitLanes] = {}
+        self._marks: dict[str, FaultMarks] = {}
         self._turning: dict[tuple[str, str], Turning] = {}
         self._start = math.nan
         for text in wanted:
@@ -479,7 +479,7 @@ class Plotter:
 
     def _add(self, drive: DriveConfiguration, name: str) -> None:
         parameter = drive.profile.parameters.get(name)
-        self._marks.setdefault(drive.name, Marks())
+        self._marks.setdefault(drive.name, FaultMarks())
         unit = parameter.unit if parameter is not None else ''
         self._curves[drive.name, name] = Curve(f'{drive.name}.{name}', unit)
         joint = drive.joint
@@ -506,10 +506,10 @@ class Plotter:
                 self._curves[place].add(telegram.time - self._start,
                                         float(parameter.value_from_raw(raw)))
 
-    def _lanes_of(self, place: tuple[str, str], parameter: Parameter) -> Lanes:
+    def _lanes_of(self, place: tuple[str, str], parameter: Parameter) -> BitLanes:
         lanes = self._lanes.get(place)
         if lanes is None:
-            lanes = self._lanes[place] = Lanes(
+            lanes = self._lanes[place] = BitLanes(
                 '.'.join(place), parameter.bits, tuple(Curve(name) for name, _ in parameter.bits))
         return lanes
 

@@ -25,7 +25,7 @@ from world import World
 
 from drive_can_bridge.cli.probe import Asker
 from drive_can_bridge.cli.profile import columns_from_option, import_file
-from drive_can_bridge.cli.scan import Survey
+from drive_can_bridge.cli.scan import BusScan
 from drive_can_bridge.configuration.profiles import read_profile
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import MappingDiffered
@@ -204,9 +204,9 @@ def test_what_it_lacks_is_said(channel: str, device: Device) -> None:
 def test_it_is_found_and_asked(channel: str, device: Device, world: World) -> None:
     bus = bus_of(channel)
     end = world.wires.of(channel)
-    survey = Survey(bus, End(end), clock().now)
-    survey.ask('cia402')
-    found, = survey.sightings
+    scan = BusScan(bus, End(end), clock().now)
+    scan.ask('cia402')
+    found, = scan.sightings
     assert (found.protocol, found.station) == ('cia402', NODE)
     drive = servo_configuration()
     findings = {each.key: each.value for each in Asker(bus, End(end), [drive], clock().now).probe(

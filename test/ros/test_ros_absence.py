@@ -15,7 +15,7 @@ pytest.importorskip('rclpy')
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import DriveState
 from drive_can_bridge.core.messages import NOTHING, Sentence
-from drive_can_bridge.ros.diagnostics import absence, Attendance
+from drive_can_bridge.ros.diagnostics import absence, PresenceCheck
 
 
 def drive(name: str = 'lift', **changes: Any) -> Any:
@@ -39,7 +39,7 @@ class Lines:
     def __init__(self) -> None:
         self.lines: list[tuple[str, str]] = []
 
-    def speaker(self, name: str) -> Any:
+    def source(self, name: str) -> Any:
         return SimpleNamespace(warning=lambda text: self.lines.append((name, text)))
 
     def warning(self, text: str) -> None:
@@ -89,7 +89,7 @@ def test_who_is_missing_is_told_with_a_sum() -> None:
             for number in range(12)]
     lost = drive('lost', ever_online=True)
     other = drive('other', state=DriveState.MAPPING_DIFFERS)    # it answers
-    Attendance(log, [*seen, drive('a'), lost, other, drive('b')], clock()).look()  # type: ignore[arg-type]
+    PresenceCheck(log, [*seen, drive('a'), lost, other, drive('b')], clock()).look()  # type: ignore[arg-type]
     assert log.lines == [
         ('a', says('never_seen')), ('b', says('never_seen')),
         ('', says('drives_missing', online=12, drives=16, missing=['a', 'b']))]
@@ -99,7 +99,7 @@ def test_who_is_missing_is_told_with_a_sum() -> None:
     ({'bus_state': 'down'}, 'bus_of_drive_down'), ({'hangs': True}, 'bus_hangs')])
 def test_on_a_bus_that_is_down_they_are_told_too(bus: dict[str, Any], expected: str) -> None:
     log = Lines()
-    Attendance(log, [drive(**bus)], clock()).look()     # type: ignore[arg-type, list-item]
+    PresenceCheck(log, [drive(**bus)], clock()).look()     # type: ignore[arg-type, list-item]
     assert log.lines == [
         ('lift', says('not_seen', why=says(expected, bus='main'))),
         ('', says('drives_missing', online=0, drives=1, missing=['lift']))]
@@ -107,5 +107,5 @@ def test_on_a_bus_that_is_down_they_are_told_too(bus: dict[str, Any], expected: 
 
 def test_where_all_were_seen_nothing_is_said() -> None:
     log = Lines()
-    Attendance(log, [drive(ever_online=True)], clock()).look()  # type: ignore[arg-type, list-item]
+    PresenceCheck(log, [drive(ever_online=True)], clock()).look()  # type: ignore[arg-type, list-item]
     assert log.lines == []

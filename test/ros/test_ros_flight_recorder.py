@@ -17,7 +17,7 @@ from drive_can_bridge.core.events import (
     DriveState, Event, MappingDiffered, Noted, StationFound, StationLost)
 from drive_can_bridge.protocols.observer import Telegram, TelegramKind, Verdict
 from drive_can_bridge.protocols.telegrams import Direction
-from drive_can_bridge.ros.bridge_runtime import Occasions
+from drive_can_bridge.ros.bridge_runtime import TraceTriggers
 from drive_can_bridge.ros.diagnostics import StatusEntry
 from drive_can_bridge.trace.files import read_records
 from drive_can_bridge.trace.tracer import Tracer
@@ -30,17 +30,17 @@ class Wanted(list[tuple[str, str, int]]):
 
     def __init__(self) -> None:
         super().__init__()
-        self.occasions = Occasions(self._trigger)
+        self.triggers = TraceTriggers(self._trigger)
 
     def _trigger(self, bus: str, reason: str, *, rank: int = 0) -> None:
         self.append((bus, reason, rank))
 
     def tells(self, event: Event, state: DriveState, drive: str = 'lift') -> None:
-        self.occasions.drive_told(drive, 'main', event, state)
+        self.triggers.drive_told(drive, 'main', event, state)
 
     def reports(self, *levels: bytes, about: str = 'drive lift') -> None:
         for level in levels:
-            self.occasions.reported(StatusEntry(about, level, '', {}), 'main')
+            self.triggers.reported(StatusEntry(about, level, '', {}), 'main')
 
 
 def test_each_error_that_begins_is_an_occasion_and_one_that_lasts_is_not() -> None:
@@ -68,7 +68,7 @@ def test_each_fault_is_an_occasion_however_short() -> None:
         assert wanted == [('main', 'lift_fault', 2), ('main', 'conveyor_fault', 2)]
         wanted.clear()
     wanted.tells(fault, DriveState.FAULT)
-    wanted.occasions.forget('lift')     # the bridge is inactive for a while
+    wanted.triggers.forget('lift')     # the bridge is inactive for a while
     wanted.tells(StationFound(), DriveState.FAULT)
     assert wanted == [('main', 'lift_fault', 2)] * 2
 
@@ -81,7 +81,7 @@ def test_each_loss_is_an_occasion_and_a_fault_that_is_there_afterwards() -> None
     assert wanted == [('main', 'lift_offline', 1), ('main', 'lift_fault', 2)] * 2
     wanted.clear()
     wanted.tells(MappingDiffered('request map'), DriveState.MAPPING_DIFFERS)
-    wanted.occasions.bus_lost('main')
+    wanted.triggers.bus_lost('main')
     assert wanted == [('main', 'lift_mapping differs', 2), ('main', 'bus_lost', 3)]
 
 

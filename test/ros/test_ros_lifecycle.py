@@ -18,7 +18,7 @@ from std_srvs.srv import SetBool
 from waiting import clock, pause
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.ros.diagnostics import Attendance
+from drive_can_bridge.ros.diagnostics import PresenceCheck
 from drive_can_bridge.ros.drive_node import DriveNode
 
 CONFIGURE, ACTIVATE = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE
@@ -187,13 +187,13 @@ def test_drives_that_run_when_activate_fails_are_stopped(
     one = waiting(bridge)
     assert client.transition(CONFIGURE)
     with one.record() as recorder:
-        def fail(_: Attendance) -> None:
+        def fail(_: PresenceCheck) -> None:
             one.online()
             for value in (0.0, 100.0):
                 client.publish('/conveyor/command/speed_setpoint', Float64(data=value))
             wait_until(lambda: recorder.words()[:1] == (1000,))
             raise RuntimeError("can't start new thread")
-        monkeypatch.setattr(Attendance, 'begin', fail)
+        monkeypatch.setattr(PresenceCheck, 'begin', fail)
         assert not client.transition(ACTIVATE)
         client.wait_logged("activate failed: RuntimeError: can't start new thread", ERROR)
         recorder.catch_up()

@@ -96,8 +96,8 @@ def test_its_thread_sums_up_what_repeats_by_itself(bench: World) -> None:
     logger = Logger()
     log = Log(logger, bench.clock)
     for _ in range(500):
-        log.speaker('lift').warning('fault')
-        log.speaker('lift').info('gone')
+        log.source('lift').warning('fault')
+        log.source('lift').info('gone')
     wait_for(lambda: sum('more time' in text for _, text in logger.lines) >= 2)
     assert logger.lines[:10] == [('warning', 'lift: fault'), ('info', 'lift: gone')] * 5
     log.close()
@@ -110,7 +110,7 @@ def test_the_end_writes_what_is_held_behind_what_waits() -> None:
     logger = Logger()
     log = Log(logger, REAL)
     for _ in range(7):
-        log.speaker('lift').info('online')
+        log.source('lift').info('online')
     log.close()
     *written, (_, summary) = logger.lines
     assert written == [('info', 'lift: online')] * 5

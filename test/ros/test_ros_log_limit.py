@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Lines that repeat, speakers that say too much: bounded, and nothing lost in silence."""
+"""Lines that repeat, sources that say too much: bounded, and nothing lost in silence."""
 
 from functools import partial
 import re
@@ -29,7 +29,7 @@ class Log:
         self.told: list[tuple[LogLevel, str]] = []
         self.woken = 0
         self.limit = LogLimit(lambda *line: self.told.append(line), self._wake, lambda: self.now)
-        self.lift = self.limit.speaker('lift')
+        self.lift = self.limit.source('lift')
 
     @property
     def lines(self) -> list[str]:
@@ -67,19 +67,19 @@ class Log:
         match = STEP.fullmatch(step)
         assert match, step
         name, times, what, rest = match.groups()
-        speaker = self.lift if name is None else self.limit.speaker(name)
+        source = self.lift if name is None else self.limit.source(name)
         for _ in range(int(times or 1)):
             topic, _, text = rest.partition(' ')
             {'flip': lambda: self.flip(float(rest)), 'flipped': lambda: self.flip(float(rest)),
              'wait': lambda: self.wait(float(rest)), 'waited': lambda: self.wait(float(rest)),
-             'info': lambda: speaker.info(rest), 'warning': lambda: speaker.warning(rest),
-             'urgent': lambda: speaker.warning(rest, urgent=True),
-             'error': lambda: speaker.error(rest),
-             'topic': partial(speaker.warn, topic, text),
-             'few': partial(speaker.warn, topic, text, few=FEW),
-             'once': partial(speaker.warn, topic, text, once=True),
-             'numbers': lambda: [speaker.info(str(number)) for number in range(int(rest))],
-             'reset': speaker.reset, 'end': lambda: self.limit.sum_up(all_of_it=True),
+             'info': lambda: source.info(rest), 'warning': lambda: source.warning(rest),
+             'urgent': lambda: source.warning(rest, urgent=True),
+             'error': lambda: source.error(rest),
+             'topic': partial(source.warn, topic, text),
+             'few': partial(source.warn, topic, text, few=FEW),
+             'once': partial(source.warn, topic, text, once=True),
+             'numbers': lambda: [source.info(str(number)) for number in range(int(rest))],
+             'reset': source.reset, 'end': lambda: self.limit.sum_up(all_of_it=True),
              }[what]()
         told = [f'{level.value[0].upper()} {text}' for level, text in self.told]
         self.told.clear()
@@ -142,10 +142,10 @@ def test_dangers_are_told_whoever_talks() -> None:
     log = Log()
     for name in range(100):
         for number in range(BURST):
-            log.limit.speaker(f'axis_{name}').info(str(number))
+            log.limit.source(f'axis_{name}').info(str(number))
     assert len(log.take()) == BURST_OF_ALL
     log.lift.warning(DANGER, urgent=True)
-    log.limit.speaker('axis_7').error('differs')
+    log.limit.source('axis_7').error('differs')
     assert log.take() == [f'lift: {DANGER}', 'axis_7: differs']
 
 
@@ -166,7 +166,7 @@ def test_a_hundred_drives_at_once_stay_readable() -> None:
     log = Log()
     for _ in range(2000):
         for name in range(100):
-            log.limit.speaker(f'axis_{name}').info('offline')
+            log.limit.source(f'axis_{name}').info('offline')
         log.wait(0.01)
     begun = len(log.take())
     assert begun <= BURST_OF_ALL + 20.0 * RATE_OF_ALL

@@ -18,7 +18,7 @@ from test_trace_agrees import running
 from transcripts import replayed, stories
 from world import World
 
-from drive_can_bridge.cli.scan import LOAD_MAX, Survey, write_parameter_file
+from drive_can_bridge.cli.scan import BusScan, LOAD_MAX, write_parameter_file
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.frame import Frame
@@ -58,8 +58,8 @@ class Bench(AskedBus):
         super().__init__(lambda frame: [answer for device in devices
                                         if (answer := device.hear(frame)) is not None])
 
-    def survey(self) -> Survey:
-        return Survey(BusConfiguration('main', 'virtual', 'x', BITRATE), self, self.clock)
+    def scan(self) -> BusScan:
+        return BusScan(BusConfiguration('main', 'virtual', 'x', BITRATE), self, self.clock)
 
 
 SAFE = [name for name, family in FAMILIES.items() if family.make_scanner().unmistakable]
@@ -80,7 +80,7 @@ def test_which_families_are_asked_without_being_named() -> None:
 @pytest.mark.parametrize('protocol', SAFE)
 def test_nobody_at_all_obeys_what_is_asked_by_default(protocol: str) -> None:
     bench = Bench(*fresh(CROWD))
-    bench.survey().ask(protocol)
+    bench.scan().ask(protocol)
     assert len(bench.sent) >= 127
     assert not [device.name for device in CROWD if device.obeyed]
 
@@ -88,7 +88,7 @@ def test_nobody_at_all_obeys_what_is_asked_by_default(protocol: str) -> None:
 @pytest.mark.parametrize('protocol', NAMED)
 def test_what_is_asked_by_name_moves_nobody_but_canopen_nodes(protocol: str) -> None:
     bench = Bench(*fresh(CROWD))
-    bench.survey().ask(protocol)
+    bench.scan().ask(protocol)
     assert bench.sent
     assert not [device.name for device in CROWD
                 if device.obeyed and not device.name.startswith('canopen')]
@@ -111,21 +111,21 @@ def test_the_devices_of_this_test_do_obey() -> None:
 
 def test_drives_are_found() -> None:
     bench = Bench(datamodel_extended(3), datamodel_extended(127), canopen(9))
-    survey = bench.survey()
+    scan = bench.scan()
     for protocol in SAFE:
-        survey.ask(protocol)
-    assert [(each.protocol, each.station, each.text) for each in survey.sightings] == [
+        scan.ask(protocol)
+    assert [(each.protocol, each.station, each.text) for each in scan.sightings] == [
         ('datamodel_extended', 3, SAID['maps']), ('datamodel_extended', 127, SAID['maps'])]
-    assert survey.nodes == {9: SAID['node']}
-    assert not survey.master
+    assert scan.nodes == {9: SAID['node']}
+    assert not scan.master
 
     bench = Bench(cannord(0), cannord(255), datamodel_standard(2), datamodel_standard(15))
-    survey = bench.survey()
+    scan = bench.scan()
     for protocol in NAMED:
-        survey.ask(protocol)
-    assert [(each.protocol, each.station) for each in survey.sightings] == [
+        scan.ask(protocol)
+    assert [(each.protocol, each.station) for each in scan.sightings] == [
         ('datamodel_standard', 2), ('datamodel_standard', 15), ('cannord', 0), ('cannord', 255)]
-    assert not survey.master
+    assert not scan.master
 
 
 def frame_of(text: str) -> Frame:
@@ -222,11 +222,11 @@ def test_whatever_others_say_in_whatever_order_a_file_can_be_written(
 
 def test_one_frame_before_all_stations_are_asked_makes_no_drive() -> None:
     bench = Bench(datamodel_extended(3))
-    survey = bench.survey()
+    scan = bench.scan()
     bench.arriving += frame_of(ANSWER_42), frame_of(ANSWER_1)
-    survey.listen(0.5)
-    survey.ask('datamodel_extended')
-    assert [(each.station, each.certainty) for each in survey.sightings] == [
+    scan.listen(0.5)
+    scan.ask('datamodel_extended')
+    assert [(each.station, each.certainty) for each in scan.sightings] == [
         (3, Certainty.CERTAIN)]
 
 
@@ -273,17 +273,17 @@ def test_a_drive_of_cia_402_says_so_whoever_asked(protocol: str) -> None:
                      b'\x43' + frame.data[1:4] + bytes.fromhex(content), False)
 
     bench = Bench(Device('node 6', lambda frame: False, answers))
-    survey = bench.survey()
-    survey.ask(protocol)
+    scan = bench.scan()
+    scan.ask(protocol)
     asked = len(bench.sent)
-    survey.ask('cia402')
-    sighting, = survey.sightings
+    scan.ask('cia402')
+    sighting, = scan.sightings
     assert sighting == ('cia402', 6, SAID['servo'], Certainty.CERTAIN)
     # what is known is not asked again
     assert not [frame for frame in bench.sent[asked:] if frame.identifier == 0x606 and (
         frame.data[1:4].hex() == '001000')]
-    assert not survey.master
-    assert survey.scanners['cia402'].settings(6) == {'mode': 'pv'}
+    assert not scan.master
+    assert scan.scanners['cia402'].settings(6) == {'mode': 'pv'}
 
 
 def test_a_servo_that_another_master_drives_otherwise() -> None:
@@ -311,7 +311,7 @@ def test_a_slow_answer_to_a_question_of_ours_is_one() -> None:
 @pytest.mark.parametrize('protocol', list(FAMILIES))
 def test_questions_leave_most_of_the_bus_to_others(protocol: str) -> None:
     bench = Bench()
-    bench.survey().ask(protocol)
+    bench.scan().ask(protocol)
     longest = 160 if bench.sent[0].extended else 135     # with an answer each, worst stuffing
     load = 2 * longest * (len(bench.sent) - 1) / BITRATE / (bench.times[-1] - bench.times[0])
     assert load < LOAD_MAX * 1.15   # 11 % stuff bits are reckoned with, not the worst case
@@ -319,29 +319,29 @@ def test_questions_leave_most_of_the_bus_to_others(protocol: str) -> None:
 
 def test_a_master_that_comes_while_asking_ends_it() -> None:
     bench = Bench()
-    survey = bench.survey()
+    scan = bench.scan()
     bench.arriving.append(Frame(0x003FFFF0, bytes(8), True))
-    survey.ask('datamodel_extended')
-    assert survey.master == SAID['requests'].format(1)
+    scan.ask('datamodel_extended')
+    assert scan.master == SAID['requests'].format(1)
     assert len(bench.sent) <= 2
 
 
 def test_a_bus_that_takes_nothing() -> None:
-    survey = Bench(Device('deaf', lambda frame: False, takes_nothing)).survey()
-    survey.ask('datamodel_extended')
-    assert survey.trouble == SAID['alone']
+    scan = Bench(Device('deaf', lambda frame: False, takes_nothing)).scan()
+    scan.ask('datamodel_extended')
+    assert scan.trouble == SAID['alone']
 
 
 @pytest.mark.parametrize('protocol', NAMED)
 def test_a_canopen_node_that_boots_ends_asking_by_name(protocol: str) -> None:
     bench = Bench()
-    survey = bench.survey()
+    scan = bench.scan()
     bench.arriving.append(Frame(0x704, b'\x00', False))
-    survey.ask(protocol)
-    assert survey.nodes == {4: 'heartbeat boot-up'}
+    scan.ask(protocol)
+    assert scan.nodes == {4: 'heartbeat boot-up'}
     assert len(bench.sent) <= 1
     sent = len(bench.sent)
-    survey.ask(protocol)
+    scan.ask(protocol)
     assert len(bench.sent) == sent
 
 
@@ -371,12 +371,12 @@ def test_mailboxes_alone_are_read(mapped: str, identifier: str, read: bool) -> N
         return None
 
     bench = Bench(Device('node 5', lambda frame: False, answers))
-    survey = bench.survey()
-    survey.ask('canopen_pkw')
+    scan = bench.scan()
+    scan.ask('canopen_pkw')
     sent = [frame.data.hex() for frame in bench.sent if frame.identifier == 0x505]
     assert sent == (['c701002500000000', 'c70100a500000000'] if read else [])
-    assert ('PKW answers' in survey.nodes[5]) is read
-    assert not survey.master
+    assert ('PKW answers' in scan.nodes[5]) is read
+    assert not scan.master
 
 
 def test_simulated_drives_are_found_and_written(bench: World, tmp_path: Path,

@@ -8,7 +8,7 @@ from drive_can_bridge.core.configuration import JointConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.observer import Telegram, TelegramKind, Verdict
 from drive_can_bridge.protocols.telegrams import Direction
-from drive_can_bridge.trace.sinks import Curve, Lanes, Marks, Plotter
+from drive_can_bridge.trace.sinks import BitLanes, Curve, FaultMarks, Plotter
 
 
 def test_a_short_curve_is_kept_as_it_is() -> None:
@@ -43,7 +43,7 @@ def telegram(time: float, raw: int, verdict: Verdict = Verdict.NORMAL) -> Telegr
 
 
 def test_what_went_wrong_is_marked() -> None:
-    marks = Marks()
+    marks = FaultMarks()
     for time, raw in ((0.0, 2), (1.0, 8), (2.0, 10), (3.0, 2), (5.0, 8), (6.0, 8)):
         marks.add(time, telegram(time, raw))
     marks.add(4.0, telegram(4.0, 0, Verdict.LOST))
@@ -53,7 +53,7 @@ def test_what_went_wrong_is_marked() -> None:
 
 
 def test_a_word_has_a_lane_for_each_bit() -> None:
-    lanes = Lanes('lift.status_word', STATUS.bits, (Curve('enabled'), Curve('fault')))
+    lanes = BitLanes('lift.status_word', STATUS.bits, (Curve('enabled'), Curve('fault')))
     for time, raw in ((0.0, 0), (1.0, 2), (2.0, 10)):
         lanes.add(time, raw)
     assert [curve.points() for curve in lanes.curves] == [

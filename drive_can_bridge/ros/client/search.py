@@ -18,7 +18,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.bridges import bridges_of, must_stand_together, stand_apart
 from drive_can_bridge.core.errors import DriveCanError, NoBridge, SilentBridge, WhichBridge
 from drive_can_bridge.core.text import is_ros_name
-from drive_can_bridge.process.environment import nobody
+from drive_can_bridge.process.environment import no_bridge
 from drive_can_bridge.process.presence import bridges, short
 from drive_can_bridge.ros.client.calls import NodeCalls
 from drive_can_bridge.ros.client.foreign import foreign, why_not
@@ -289,10 +289,10 @@ def _none(graph: Graph, pattern: str | None, search: Search,
           silent: Sequence[str]) -> DriveCanError:
     """Return the error for no bridge, or none that answers, such as one that has left."""
     if silent:
-        return SilentBridge(nobody(pattern, silent, search.waited(silent)))
+        return SilentBridge(no_bridge(pattern, silent, search.waited(silent)))
     domain = graph.client_node.context.get_domain_id()
     known = {short(name) for name in search.found}
     hung = [sentences.silent_and_holds(name=each.name, how=each.silence(domain))
             for each in bridges()
             if each.domain == domain and each.may_be_in(pattern) and each.name not in known]
-    return SilentBridge('; '.join(hung)) if hung else NoBridge(nobody(pattern))
+    return SilentBridge('; '.join(hung)) if hung else NoBridge(no_bridge(pattern))
