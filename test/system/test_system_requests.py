@@ -20,7 +20,7 @@ import time
 from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Process, Processes, Simulator
 import pytest
-from test_system_reconnection import start_moving
+from test_system_reconnection import start_moving, status_of
 from waiting import pause, wait_for
 
 pytestmark = pytest.mark.real
@@ -97,13 +97,16 @@ def test_nobody_else_notices(processes: Processes, client: Client, namespace: st
                              monkeypatch: pytest.MonkeyPatch, what: str) -> None:
     # a drive that answers late is the machine's affair, and so is one that is asked for a value
     file = bridge_file(tmp_path, memory_limit_mb=128, drives={
-        'conveyor': {**CONVEYOR, 'parameter_timeout': 60.0}})
+        'conveyor': {**CONVEYOR, 'missed_limit': 250, 'parameter_timeout': 60.0}})
     simulator = processes.simulator(file)
     with _burdened(processes, file, namespace, tmp_path, monkeypatch) as (bridge, trouble, over):
         drive = f'/{namespace}/conveyor'
         start_moving(client, drive)
         assert client.get(drive, 'ramp_time') != [None]
         client.meet(f'{drive}/quick_stop')
+
+        def exchanges() -> int:
+            return int(client.diagnostics(status_of(drive))['exchanges'])
         trouble.write_text(what, encoding='ascii')
         since = len(simulator.lines)
         with _Sleeper() as sleeper:
@@ -113,6 +116,8 @@ def test_nobody_else_notices(processes: Processes, client: Client, namespace: st
             success, message, took = client.control_again(f'{drive}/quick_stop')
             assert success, message
             assert took < 1.0
+            before = exchanges()    # what the drive answers is read
+            wait_for(lambda: exchanges() >= before + 10)
             pause(1.0)
         gaps = [later - earlier for (earlier, _), (later, _) in itertools.pairwise(
             _requests(simulator, since))]
