@@ -497,3 +497,17 @@ def test_who_looks_at_the_system_clock() -> None:
 def test_everybody_else_is_handed_a_clock() -> None:
     assert {path.relative_to(PACKAGE).as_posix() for path in SOURCES
             if uses(path, ('time', 'threading', 'queue'), WAYS)} == OWN_WAYS
+
+
+def test_what_heirs_that_stay_python_may_change_is_a_class_variable() -> None:
+    """A compiled class looks up nothing else in the class of an object."""
+    for path in sorted(PACKAGE.rglob('*.py')):
+        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+            if isinstance(node, ast.ClassDef) and any(
+                    'allow_interpreted_subclasses' in ast.unparse(each)
+                    for each in node.decorator_list):
+                for line in node.body:
+                    assert not isinstance(line, ast.Assign) or ast.unparse(
+                        line.targets[0]) == '__slots__', (path, node.name, ast.unparse(line))
+                    assert not isinstance(line, ast.AnnAssign) or line.value is None or (
+                        'ClassVar' in ast.unparse(line.annotation)), (path, ast.unparse(line))

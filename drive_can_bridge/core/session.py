@@ -29,7 +29,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from enum import Enum
 import math
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from drive_can_bridge.compiled import mypyc_attr
 from drive_can_bridge.core import sentences
@@ -121,6 +121,7 @@ class Session(ABC):
     :ivar stage: what is being done for the drive.
     :ivar activated: the bridge is active; ``active``: and does not leave the drive alone.
     :ivar online: the drive exchanges process data.
+    :ivar homes: it can look for its reference.
     :ivar ever_online: it did so at least once since activation.
     :ivar defect: what went wrong in the program, in words, while the drive is left alone for that.
     :ivar serving: it only cares for parameter requests; ``online``: the last one was answered.
@@ -131,10 +132,8 @@ class Session(ABC):
     """
 
     services: DriveServices
-    #: it can look for its reference
-    homes = False
     #: what came with a frame is handled before anything is sent because of that
-    looks_ahead = False
+    looks_ahead: ClassVar[bool] = False
     _acyclic: AcyclicPart
 
     def __init__(self, drive: DriveConfiguration, control: ControlMachine | None, *,
@@ -166,6 +165,7 @@ class Session(ABC):
         self.stage = Stage.IDLE
         self.activated = self.active = self.serving = self.bus_available = False
         self.online = self.ever_online = False
+        self.homes = False
         self.defect = NOTHING
         self.enabled_by = drive.name
         self.partners: Sequence[Session] = ()

@@ -32,9 +32,11 @@ from drive_can_bridge.transport.bus_identity import device_of, is_absent
 from drive_can_bridge.transport.end_point import Counts, EndPoint
 from drive_can_bridge.transport.error_frames import ADVICE_ALONE, BUS_OFF, BusError
 from drive_can_bridge.transport.failures import in_words
-from drive_can_bridge.transport.port import open_port
+from drive_can_bridge.transport.port import open_port as open_by_python_can
 from drive_can_bridge.transport.whereabouts import Whereabouts
 
+#: opens a bus; asked for by this name each time, so that another one can stand here
+open_port: Callable[..., EndPoint] = open_by_python_can
 #: s that a receive may block: how soon a stop, or a loss seen by a sender, is noticed
 RECEIVE_TIMEOUT = 0.02
 #: send time-outs, and s, in which nothing leaves, until the bus counts as blocked

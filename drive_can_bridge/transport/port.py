@@ -169,7 +169,7 @@ class Port(EndPoint):
             self._malformed()
             return None
         self._malformed_in_row = 0
-        frame = Frame(message.arbitration_id, data, message.is_extended_id)
+        frame = Frame(message.arbitration_id, data, bool(message.is_extended_id))
         return frame if self._echo is None or self._is_new(self._echo, frame) else None
 
     def _receive_directly(self, raw: RawSocket, timeout: float) -> Frame | None:

@@ -176,6 +176,7 @@ def test_a_mapped_number_may_come_a_moment_later(name: str) -> None:
     assert says('fault_named', number='7', name='overcurrent') in trip(partner, 7)
 
 
+@pytest.mark.interpreted    # replaces methods
 def test_a_fault_that_comes_again_while_the_last_one_is_asked_for() -> None:
     asked: list[ReadRequest] = []
     session: Any = PARTNERS['cia402']().talk.session

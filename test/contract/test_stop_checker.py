@@ -23,7 +23,6 @@ from drive_can_bridge.protocols.safe_stop import SafeStop
 BY_CHANCE = times(3, 20)
 
 
-@pytest.mark.interpreted    # replaces methods
 @pytest.mark.parametrize('kind', KINDS)
 def test_no_motor_runs_on(kind: str) -> None:
     everything = [*all_stories(1)]
@@ -103,6 +102,7 @@ DEFECTS: list[tuple[type, str, Any, str, Story]] = [
 
 
 @pytest.mark.parametrize(('owner', 'name', 'instead', 'kind', 'story'), DEFECTS)
+@pytest.mark.interpreted    # replaces methods
 def test_what_is_broken_is_seen(owner: type, name: str, instead: Any, kind: str,
                                 story: Story, monkeypatch: pytest.MonkeyPatch) -> None:
     assert not broken(kind, story)

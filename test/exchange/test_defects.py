@@ -179,11 +179,9 @@ def raising(times: float, then: Callable[..., Any]) -> Callable[..., Any]:
     return step
 
 
-@pytest.mark.interpreted    # replaces methods
-@pytest.mark.interpreted    # replaces methods
-@pytest.mark.interpreted    # replaces methods
 @pytest.mark.parametrize(('kind', 'place', 'times'), some(product(
     KINDS, [*LISTENER, *STEPS], [1, float('inf')]), 7))
+@pytest.mark.interpreted    # replaces methods
 def test_a_defect_stops_one_drive_and_disturbs_no_other(
         kind: str, place: str, times: float, monkeypatch: pytest.MonkeyPatch) -> None:
     world = World(kind)
@@ -222,6 +220,7 @@ def test_a_defect_stops_one_drive_and_disturbs_no_other(
 
 @pytest.mark.parametrize(('kind', 'place', 'mute'), some(product(
     KINDS, LISTENER, [False, True]), 5))
+@pytest.mark.interpreted    # replaces methods
 def test_a_listener_that_raises_costs_no_stop_frame(
         kind: str, place: str, mute: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """The stop of the end goes out whole, and to its end, whoever hears it."""
@@ -253,6 +252,7 @@ def test_a_listener_that_raises_costs_no_stop_frame(
 
 @pytest.mark.parametrize('place', [0, 1])
 @pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.interpreted    # replaces methods
 def test_a_drive_that_was_deaf_to_the_stop_for_a_defect_is_told_by_the_end(
         kind: str, place: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Within the second for which it is left alone, and whoever of a group it is."""

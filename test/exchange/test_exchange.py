@@ -99,6 +99,7 @@ def test_a_foreign_broadcast_is_told_of_each_drive_that_would_obey(
     assert [session.statistics.rejected for session in bench.sessions] == [0] * 4
 
 
+@pytest.mark.interpreted    # opens nothing
 def test_routes_become_filters_of_the_link(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench()
     counted = Route(0x000, 0x7FF, False)
@@ -337,6 +338,7 @@ def test_a_periodic_task_keeps_its_time_where_no_drive_wants_anything(clock: Jum
     bench.exchange.close()
 
 
+@pytest.mark.interpreted    # replaces a method
 def test_the_reader_makes_the_passes_as_long_as_it_is_back_in_time(clock: JumpingClock) -> None:
     bench = Bench(drive(period=0.005, mapping='assume'), clock=clock)
     exchange = bench.exchange
@@ -376,6 +378,7 @@ def test_the_reader_makes_the_passes_as_long_as_it_is_back_in_time(clock: Jumpin
     exchange.close()
 
 
+@pytest.mark.interpreted    # replaces a method
 def test_the_timer_thread_does_not_oversleep_what_the_reader_has_found_out(
         clock: JumpingClock) -> None:
     bench = Bench(drive(period=0.005), clock=clock)
@@ -417,6 +420,7 @@ def test_what_a_frame_makes_due_wakes_nobody_but_the_reader() -> None:
         assert (exchange._wake_at < 20.0) is not rings
 
 
+@pytest.mark.interpreted    # replaces a property
 def test_deactivate_gives_up_in_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench(drive())
     bench.online()
@@ -669,6 +673,7 @@ def test_defect_of_the_reader_is_fatal() -> None:
     assert bench.exchange.bus_state == 'failed'
 
 
+@pytest.mark.interpreted    # a task that only looks like one
 def test_defect_in_the_timer_thread_is_told_not_swallowed(clock: JumpingClock) -> None:
     bench = Bench(drive(mapping='assume', period=0.005), clock=clock)
     failing = False

@@ -283,7 +283,7 @@ def test_frame_that_is_there_before_the_bus_counts_as_open_is_older_than_what_is
             self.coming.append(ANSWER)
     heard: list[tuple[Frame, float]] = []
     monkeypatch.setattr(Listener, 'bus_opened', lambda listener: (
-        listener.told.append('opened'), pause(0.02)))
+        listener.told.append('opened'), pause(0.02))[-1])
     monkeypatch.setattr(Listener, 'frame_received', lambda listener, *frame: heard.append(frame))
     make(ReadyPort)
     wait_for(lambda: heard)

@@ -79,6 +79,16 @@ def test_frame(bus: FakeBus) -> None:
     assert bus.sent[0].is_extended_id
 
 
+def test_what_an_adapter_says_by_a_number_is_a_flag(bus: FakeBus) -> None:
+    """Nobody checks it, and compiled code takes nothing else."""
+    port = Port(bus, REAL)
+    bus.coming.append(can.Message(
+        arbitration_id=0x103FFFF0, is_extended_id=1))   # type: ignore[arg-type]
+    received = port.receive(0.02)
+    assert received is not None
+    assert received.extended is True
+
+
 def test_filters_of_adapters_that_have_none(bus: FakeBus) -> None:
     bus.set_filters([{'can_id': 0x123, 'can_mask': 0x7FF, 'extended': False}])
     port = Port(bus, REAL)
