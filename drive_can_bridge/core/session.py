@@ -173,14 +173,21 @@ class Session(ABC):
         self._parts: Sequence[Part] = ()
         self._timed: list[tuple[Timed, Callable[[float], None]]] = []
 
-    def look_after(self, *parts: Part, channel: AcyclicPart) -> None:
-        """Set the parts, in the order in which they act; then come control word and channel."""
-        self._parts, self._acyclic = parts, channel
+    def look_after(self, *parts: Part, channel: AcyclicPart,
+                   behind_control: Sequence[Part] = ()) -> None:
+        """
+        Set the parts, in the order in which they act.
+
+        :param channel: acts at last.
+        :param behind_control: act between the control word and the channel.
+        """
+        self._parts, self._acyclic = (*parts, *behind_control), channel
         self._timed = [(part, part.handle_timer) for part in parts]
         if self.control is not None:
             self._timed.append((self.control, self._look_after_control))
         else:
             self._timed.append((self.neutral_stop, self.neutral_stop.handle_timer))
+        self._timed += [(part, part.handle_timer) for part in behind_control]
         self._timed.append((channel, channel.advance))
 
     # -- life cycle -------------------------------------------------------------------------------

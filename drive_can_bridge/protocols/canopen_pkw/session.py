@@ -55,7 +55,7 @@ from drive_can_bridge.protocols.canopen_pkw.pkw import PkwLayout, PkwMessage
 from drive_can_bridge.protocols.canopen_pkw.rounds import Rounds
 from drive_can_bridge.protocols.canopen_pkw.transactor import (
     MailboxChannel, MailboxTransactor, Procedure)
-from drive_can_bridge.protocols.canopen_pkw.writers import Writers
+from drive_can_bridge.protocols.canopen_pkw.writers import ExpiryWatch, Writers
 from drive_can_bridge.protocols.channel import Priority
 from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
@@ -91,7 +91,8 @@ class PkwSession(Session):
             self, procedures.RegisterAccess(self._channel, self.retry, placement))
         self._course = Life(self._channel)
         self.look_after(
-            self._course, HeartbeatWatch(self, self._node), channel=self._channel)
+            self._course, HeartbeatWatch(self, self._node), channel=self._channel,
+            behind_control=[ExpiryWatch(self, self._writers)])
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -336,8 +337,6 @@ class PkwSession(Session):
     # -- timer ------------------------------------------------------------------------------------
 
     def handle_timer(self, now: float) -> None:
-        if now >= self._expires_at and self._writers.expire(now):
-            self._writers.write_setpoints(now)
         super().handle_timer(now)
         if now >= self._round_due:
             self._writers.round_begins()
@@ -353,13 +352,8 @@ class PkwSession(Session):
         """When the next round is due; infinity: not before this one has ended."""
         return math.inf if self._exchange.reading else self._exchange.timer.due
 
-    @property
-    def _expires_at(self) -> float:
-        """When setpoints have to be looked at for their age; infinity: the stop writes all."""
-        return self.setpoints.expires_at if self.stage is Stage.RUNNING else math.inf
-
     def next_timer(self) -> float:
-        return min(self._round_due, self._expires_at, super().next_timer())
+        return min(self._round_due, super().next_timer())
 
     def control_refusal(self, action: ControlAction, refusal: Sentence, *,
                         offline: bool) -> Sentence:

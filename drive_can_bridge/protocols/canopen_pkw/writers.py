@@ -19,6 +19,7 @@ a device under local control, say, takes it as soon as it is back under remote c
 
 from collections import Counter
 from collections.abc import Sequence
+import math
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction
@@ -27,7 +28,7 @@ from drive_can_bridge.core.holding import Setpoint
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import control_word, status_word
-from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import CONTROL_WORD
 from drive_can_bridge.protocols.acyclic_output import Acknowledged, AcyclicOutput
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
@@ -394,3 +395,24 @@ class Writers:
         if self._word_refusal:
             texts.append(sentences.word_not_taken(self._word_refusal))
         return texts
+
+
+class ExpiryWatch:
+    """The part of a session that takes back commands that are too old, whatever is being read."""
+
+    def __init__(self, session: Session, writers: Writers) -> None:
+        self._session, self._writers = session, writers
+
+    @property
+    def due(self) -> float:
+        """When ages are to be looked at; infinity: what is lost, or stopped, has no commands."""
+        running = self._session.stage is Stage.RUNNING
+        return self._session.setpoints.expires_at if running else math.inf
+
+    def handle_timer(self, now: float) -> None:
+        """Write what goes neutral now."""
+        if self._writers.expire(now):
+            self._writers.write_setpoints(now)
+
+    def stop(self) -> None:
+        """Do nothing: the stage says it."""

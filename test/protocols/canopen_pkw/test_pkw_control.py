@@ -74,6 +74,20 @@ def test_drive_that_refuses_its_status_is_not_driven_on() -> None:
         note.text for note in talk.events(Noted)]
 
 
+def test_an_enable_that_fails_disables_before_an_old_command_is_taken_back() -> None:
+    """A process that was late finds both at once, of a drive that has refused its status."""
+    talk = driven(command_timeout=0.2, control_timeout=0.1, missed_limit=9)
+    sent = talk.at(10.13)
+    while sent:
+        text, = sent
+        sent = talk.hears(denied(text) if text.startswith('505#C701') else echo(text), 10.131)
+    assert talk.asks(ControlAction.ENABLE, 10.14) == []
+    assert talk.control_outcomes() == []
+    assert talk.session.state is DriveState.ONLINE
+    assert talk.at(10.32) in ([DISABLE_0], [DISABLE_1])
+    assert [outcome[:2] for outcome in talk.control_outcomes()] == [('enable', False)]
+
+
 # -- lost answers ---------------------------------------------------------------------------------
 
 

@@ -4,9 +4,9 @@
 from builders import read
 from conversation import Conversation
 from pkw_builders import (
-    ANSWER_0, ANSWER_1, BOOT_UP, configuration, CONTROL, FLC, IDLE, IDLE_ANSWER, LEVEL, online,
-    OPERATIONAL, PRE_OPERATIONAL, READ_0, READ_1, reading, START, started, STATUS, STOPPED,
-    TRIPPED_1,
+    ANSWER_0, ANSWER_1, BOOT_UP, configuration, CONTROL, DISABLE_0, DISABLE_1, driven, FLC, IDLE,
+    IDLE_ANSWER, LEVEL, online, OPERATIONAL, PRE_OPERATIONAL, READ_0, READ_1, reading, START,
+    started, STATUS, STOPPED, TRIPPED_1,
 )
 import pytest
 from saying import says
@@ -179,6 +179,15 @@ def test_lost_heartbeat_ends_the_round_under_way() -> None:
     assert not talk.session.online
     # what comes next is the beginning of another one
     assert talk.hears(IDLE_ANSWER, 10.136) == ['505#C70100A500000000']
+
+
+def test_lost_heartbeat_stops_a_drive_before_its_old_command_is_taken_back() -> None:
+    """A process that was late finds both at once: `disable` goes before any setpoint."""
+    talk = driven(command_timeout=0.2, heartbeat_timeout=0.1)
+    talk.hears(OPERATIONAL, 10.195)
+    sent = talk.at(10.3)
+    assert not talk.session.online
+    assert sent in ([DISABLE_0], [DISABLE_1])
 
 
 def test_status_of_a_drive_whose_heartbeats_have_ceased_says_nothing() -> None:
