@@ -14,6 +14,12 @@ from typing import Any
 
 #: s
 PERIOD = 0.05
+#: keys of diagnostics that every drive has, whatever its family; ``control_state`` with a control word
+KEYS = {
+    'state', 'code', 'exchanges', 'missed_exchanges', 'latency_mean_ms', 'latency_p99_ms',
+    'latency_max_ms', 'period_error_mean_ms', 'period_error_p99_ms', 'period_error_max_ms',
+    'command_age_s', 'commands_refused', 'frames_rejected', 'late_answers',
+    'parameter_requests_ok', 'parameter_requests_failed', 'last_parameter_error'}
 SAME_EVERYWHERE = """
   ramp_time:
     {number: 102, type: uint16, scale: 0.01, unit: s, access: rw, storage: eeprom, minimum: 0.01,

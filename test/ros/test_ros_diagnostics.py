@@ -8,6 +8,7 @@ from typing import Any
 from bridges import Bridge, CONVEYOR, HASTY, parameters, StartBridge
 from clients import Client, ERROR, facts, wait_until
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from families import KEYS
 import pytest
 from saying import says
 from waiting import clock
@@ -29,12 +30,7 @@ BUS_KEYS = {
     'state', 'code', 'load_percent', 'frames_sent', 'frames_received', 'frames_rejected',
     'error_frames',
     'bus_off_count', 'reconnections', 'send_failures'}
-DRIVE_KEYS = {
-    'state', 'code', 'exchanges', 'missed_exchanges', 'latency_mean_ms', 'latency_p99_ms',
-    'latency_max_ms', 'period_error_mean_ms', 'period_error_p99_ms', 'period_error_max_ms',
-    'command_age_s', 'commands_refused', 'frames_rejected', 'late_answers',
-    'parameter_requests_ok', 'parameter_requests_failed', 'last_parameter_error', 'short_frames',
-    'fault_code'}
+DRIVE_KEYS = KEYS | {'short_frames', 'fault_code'}
 
 
 def test_names_and_keys(bridge: StartBridge, client: Client) -> None:

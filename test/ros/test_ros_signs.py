@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
 from rcl_interfaces.srv import ListParameters
 
-from drive_can_bridge.process.environment import nobody
+from drive_can_bridge.process.environment import no_bridge
 from drive_can_bridge.process.presence import Present
 from drive_can_bridge.ros.client import search, signs
 
@@ -79,7 +79,7 @@ def test_one_that_is_not_seen_to_live_has_a_few_seconds(
     looked = looking(False)
     assert settled_after(looked) == pytest.approx(5.0, abs=0.3)
     assert not looked.found[BRIDGE].answered
-    assert nobody(None, [BRIDGE], looked.waited([BRIDGE])).endswith(
+    assert no_bridge(None, [BRIDGE], looked.waited([BRIDGE])).endswith(
         f'{BRIDGE} does not, for 5 s (the computer may be busy)')
 
 
