@@ -77,10 +77,10 @@ class Do(IntEnum):
 
     NOTHING = 0
     #: by cycles where the request map is known to agree, else by number; a stop by number that is
-    #: a stop that is not confirmed is commanded again
+    #: not confirmed is reported
     STOP = 1
-    #: not by cycles: they do not reach it; families without acyclic writes warn at once
-    #: be running
+    #: not by cycles: they do not reach it; families without acyclic writes warn at once that it
+    #: may still be running
     STOP_BY_NUMBER = 2
     #: warn that it may still be running
     WARN = 3

@@ -14,7 +14,7 @@ from typing import Any
 
 #: s
 PERIOD = 0.05
-#: keys of diagnostics that every drive has, whatever its family; ``control_state`` with a control word
+#: keys of diagnostics that every drive has; ``control_state`` comes with a control word
 KEYS = {
     'state', 'code', 'exchanges', 'missed_exchanges', 'latency_mean_ms', 'latency_p99_ms',
     'latency_max_ms', 'period_error_mean_ms', 'period_error_p99_ms', 'period_error_max_ms',
