@@ -101,7 +101,7 @@ class AnswerLate:
 
     :param seconds: by how much the last one did.
     :param would_hold: what to set instead; '': that is not known, or was reported before.
-    :param taken: it counts for its exchange all the same: nothing is lost.
+    :param taken: all since the event before count for their exchanges: nothing is lost.
     """
 
     seconds: float

@@ -39,13 +39,15 @@ class Reporter:
     :ivar advice_kind: what that rests on.
     """
 
-    __slots__ = ('_statistics', '_tell_late_at', 'advice', 'advice_kind', 'events')
+    __slots__ = (
+        '_late_taken', '_statistics', '_tell_late_at', 'advice', 'advice_kind', 'events')
 
     def __init__(self, statistics: DriveStatistics, advice: Sentence) -> None:
         self.events: list[Event] = []
         self.advise(advice)
         self._statistics = statistics
         self._tell_late_at = -math.inf
+        self._late_taken = True     # all late answers since then
 
     def take(self) -> list[Event]:
         """Return what happened since the last call."""
@@ -100,10 +102,13 @@ class Reporter:
         elif late > 0.0:
             self._statistics.late += 1
             self._statistics.late_by = late
+            self._late_taken = self._late_taken and taken
             if now >= self._tell_late_at:   # once in a while
                 self._tell_late_at = now + TELL_LATE
                 self.events.append(AnswerLate(
-                    late, would_hold(late) if would_hold is not None else NOTHING, taken))
+                    late, would_hold(late) if would_hold is not None else NOTHING,
+                    self._late_taken))
+                self._late_taken = True
 
     def found(self) -> None:
         """Report that the drive exchanges process data."""

@@ -5,7 +5,7 @@ from builders import SPEED
 from saying import says
 
 from drive_can_bridge.core.events import (
-    FrameRejected, Noted, SetpointsExpired, StationFound, StationLost,
+    AnswerLate, FrameRejected, Noted, SetpointsExpired, StationFound, StationLost,
 )
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.setpoints import Setpoints
@@ -50,3 +50,15 @@ def test_advice_while_the_drive_is_offline() -> None:
     report.lost('bus down', was_online=False)
     assert report.advice == 'bus down'
     assert report.take() == [StationFound(), StationLost('silent')], 'nobody is lost twice'
+
+
+def test_late_answers_that_count_hide_none_that_is_lost() -> None:
+    """One event in a while: what was lost since the one before shows in it."""
+    report = Reporter(DriveStatistics(), '')
+    report.unasked('', 0.001, 10.0, taken=True)
+    report.unasked('', 0.002, 12.0)
+    report.unasked('', 0.003, 19.9, taken=True)
+    assert report.take() == [AnswerLate(0.001, taken=True)]
+    report.unasked('', 0.004, 20.0, taken=True)
+    report.unasked('', 0.005, 30.0, taken=True)
+    assert report.take() == [AnswerLate(0.004), AnswerLate(0.005, taken=True)]
