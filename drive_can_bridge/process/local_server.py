@@ -156,8 +156,7 @@ class LocalServer:
         self._serve = serve
         self._open_to_all = open_to_all
         self._trusted = trusted_users()
-        # looked up now: where the names are on the network, that may take long
-        self._names = {user: user_name(user) for user in self._trusted}
+        self._names = dict[int, str]()
         self._report = report
         self._prepare_thread = prepare_thread
         self._keep_share = keep_share
@@ -168,6 +167,8 @@ class LocalServer:
         self._closing = threading.Lock()    # of the bell
         listener.setblocking(False)
         listener.listen(BACKLOG)
+        # where the names are on the network, that may take long
+        clock.worker(self._look_up_names, 'names of users').start()
         self._thread: Worker = clock.worker(self._run, 'local way')
         self._thread.start()
 
@@ -312,6 +313,10 @@ class LocalServer:
             asked.refuse(host_texts.too_many_ask)
         else:
             self._serve(asked)
+
+    def _look_up_names(self) -> None:
+        for user in self._trusted:
+            self._names[user] = user_name(user)
 
     def _whom(self, caller: _Caller) -> str:
         user = self._names.get(caller.user, f'user {caller.user}')

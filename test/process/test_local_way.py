@@ -14,6 +14,7 @@ import time
 from clocks import REAL
 from hypothesis import given, strategies as st
 import pytest
+from waiting import wait_for
 
 from drive_can_bridge import __version__
 from drive_can_bridge.compiled import build
@@ -161,6 +162,12 @@ def ask(host: Host, *words: str) -> list[list[str]]:
         line.close()
 
 
+def whose(host: Host) -> str:
+    """Ask, and return whom that is of for the log."""
+    ask(host, 'stop')
+    return host.asked[-1].whom
+
+
 def test_question_and_answer_on_one_connection(host: Host) -> None:
     line = host.call()
     assert line.believed
@@ -171,13 +178,29 @@ def test_question_and_answer_on_one_connection(host: Host) -> None:
 
 
 def test_a_bridge_knows_whose_process_asks(host: Host, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[str] = []
-    monkeypatch.setattr(host.server, '_serve', lambda each: (asked.append(each.whom), each.end()))
-    ask(host, 'stop')
-    monkeypatch.setattr(local_server, 'peer_of', lambda _: (0, 4321))   # another name space
-    ask(host, 'stop')
     name = pwd.getpwuid(os.geteuid()).pw_name
-    assert asked == [f'user {name}, process {os.getpid()}', 'user 4321']
+    wait_for(lambda: whose(host) == f'user {name}, process {os.getpid()}', 'its name')
+    monkeypatch.setattr(local_server, 'peer_of', lambda _: (0, 4321))   # another name space
+    assert whose(host) == 'user 4321'
+
+
+def test_names_that_take_long_to_look_up_hold_up_nobody(
+        monkeypatch: pytest.MonkeyPatch, threads: None) -> None:
+    """They may be on a network that is not there yet, when a computer starts."""
+    found = threading.Event()
+
+    def look_up(_: int) -> str:
+        found.wait(5.0)
+        return 'user late'
+    monkeypatch.setattr(local_server, 'user_name', look_up)
+    monkeypatch.setattr(presence, 'PREFIX', f'test_{os.getpid()}')
+    host = Host()
+    try:
+        assert whose(host) == f'user {os.geteuid()}, process {os.getpid()}'
+        found.set()
+        wait_for(lambda: whose(host) == f'user late, process {os.getpid()}', 'the name')
+    finally:
+        host.close()
 
 
 def test_a_user_without_a_name_has_a_number() -> None:
