@@ -2,13 +2,14 @@
 """Whatever was told to run is told to stop, soon, and by frames that really left."""
 
 from dataclasses import replace
+import math
 
 from builders import BOOL, parameter, RAM, read
 from conversation import Conversation
 from pkw_builders import (
-    ANSWER_0, ANSWER_1, BOOT_UP, CLASS, CONTROL, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1,
-    driven, echo, ENABLE_0, IDLE, IDLE_ANSWER, online, PRE_OPERATIONAL, READ_0, READ_1, ready,
-    running, RUNS_0, RUNS_1, SPEED, SPEED_1, START, STILL_0, STILL_1, STOPPED, TABLE, WORD,
+    ANSWER_0, ANSWER_1, answered, BOOT_UP, CLASS, CONTROL, DISABLE_0, DISABLE_1, DISABLED_0,
+    DISABLED_1, driven, echo, ENABLE_0, IDLE, IDLE_ANSWER, online, PRE_OPERATIONAL, READ_0, READ_1,
+    ready, running, RUNS_0, RUNS_1, SPEED, SPEED_1, START, STILL_0, STILL_1, STOPPED, TABLE, WORD,
 )
 import pytest
 from saying import may_run, says
@@ -16,6 +17,7 @@ from saying import may_run, says
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, Noted
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.profile import ControlTable
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 READ_CLASS_0 = '505#5E02002500000000'
@@ -49,6 +51,39 @@ def test_stall() -> None:
     assert talk.hears(DISABLED_0, 15.003) == []
     assert talk.until(15.0501) == [(15.05, READ_1)], 'the answer has synchronised the mailbox'
     assert worries(talk) == []
+
+
+@pytest.mark.parametrize('way', ['the end', 'a defect', 'a stall', 'the bus'])
+@pytest.mark.parametrize('control', [CONTROL, None], ids=['word', 'no word'])
+def test_a_command_that_is_too_old_by_then_changes_no_stop(
+        way: str, control: ControlTable | None) -> None:
+    def sent(command_timeout: float) -> list[tuple[float, str]]:
+        talk = commanded(command_timeout) if control is None else driven(
+            command_timeout=command_timeout)
+        session, found = talk.session, talk.until(10.114)
+        if way == 'the end':
+            found += [(10.115, text) for text in talk.deactivate(10.115)]
+        elif way == 'a defect':
+            session.fail(says('internal_error_in_callback', kind='', text=''), 10.115)
+        elif way == 'a stall':
+            found += [(10.115, text) for text in talk.time_lost(10.115)]
+        elif way == 'the bus':
+            talk.bus_down(10.115)
+            talk.bus_up(10.12)
+        assert session.setpoints.expires_at == math.inf, 'nothing is to be looked at'
+        return found + talk.until(16.0)
+    assert sent(0.3) == sent(0.0) != []
+
+
+def commanded(command_timeout: float) -> Conversation:
+    """Return a drive without a control word that runs at 10 Hz."""
+    talk = online(request=(SPEED,), control=None, command_timeout=command_timeout)
+    answered(talk, talk.at(10.07), 10.071)
+    assert talk.commands(0, 0.0, 10.095) is CommandOutcome.ARMED
+    assert talk.commands(0, 10.0, 10.095) is CommandOutcome.ACCEPTED
+    answered(talk, talk.at(10.09), 10.096)
+    answered(talk, talk.at(10.11), 10.111)
+    return talk
 
 
 def test_signal_that_comes_before_anybody_noticed_the_stall() -> None:
