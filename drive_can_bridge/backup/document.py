@@ -257,9 +257,11 @@ def written(facts: DriveFacts, head: Head, settings: Iterable[tuple[Parameter, i
 
 
 def _line(parameter: Parameter, raw: int) -> str:
-    unit = f'  # {printable(parameter.unit, None)}' if parameter.unit else ''
+    meant = ' '.join(filter(None, (
+        parameter.unit, parameter.name_of(parameter.value_from_raw(raw)))))
+    comment = f'  # {printable(meant, None)}' if meant else ''
     name = f"'{parameter.name}'" if parameter.name in _WORDS else parameter.name
-    return f'    {name}: {value_in_file(parameter, raw)}{unit}'
+    return f'    {name}: {value_in_file(parameter, raw)}{comment}'
 
 
 #: how ros2 param dump writes what has no value

@@ -33,8 +33,6 @@ _DRIVE = re.compile(r'(?P<place>/?(?:[A-Za-z_][A-Za-z0-9_]*/)*)[a-z][a-z0-9_]*')
 _NONE = '-'
 #: settings that may all be misspelt
 _FEW = 3
-#: name, unit ('' where it is unknown), the values of both sides; None: it has no such setting
-Difference = tuple[str, str, Value | None, Value | None]
 #: names of what is left out that are told
 _NAMED_MAX = 5
 
@@ -50,6 +48,33 @@ class ComparedSetting:
 
     value: Value
     raw: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """
+    A setting that is not the same on both sides.
+
+    :param parameter: None: nobody knows it.
+    :param one: its value on the first side; None: there is no such setting.
+    :param other: its value on the second side.
+    """
+
+    name: str
+    parameter: Parameter | None
+    one: Value | None
+    other: Value | None
+
+    @property
+    def unit(self) -> str:
+        """The unit of both values; '' where it is unknown."""
+        return self.parameter.unit if self.parameter else ''
+
+    def text(self, value: Value | None) -> str:
+        """Return the value of one side for people."""
+        if value is None:
+            return _NONE
+        return value_text(value) if self.parameter is None else self.parameter.named(value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,8 +149,8 @@ def differences(first: Side, second: Side) -> list[Difference]:
         one, other = first.settings.get(name), second.settings.get(name)
         parameter = first.parameters.get(name) or second.parameters.get(name)
         if one is None or other is None or not _same(one, other, parameter):
-            found.append((name, parameter.unit if parameter else '',
-                          one.value if one else None, other.value if other else None))
+            found.append(Difference(name, parameter, one.value if one else None,
+                                    other.value if other else None))
     return found
 
 
@@ -266,16 +291,13 @@ def _tell_profile(backup: Backup, drive: Drive) -> None:
 
 def _show(args: Namespace, found: Sequence[Difference]) -> None:
     if args.json:
-        print_json(*({'parameter': name, 'unit': unit, 'a': one, 'b': other}
-                     for name, unit, one, other in found))
+        print_json(*({'parameter': each.name, 'unit': each.unit, 'a': each.one, 'b': each.other}
+                     for each in found))
     elif found:
         first, second = args.words
         print_table(('parameter', first, second, 'unit'), [
-            (name, _text(one), _text(other), unit) for name, unit, one, other in found],
-            numbers=(first, second))
+            (each.name, each.text(each.one), each.text(each.other), each.unit)
+            for each in found], numbers=(first, second))
     else:
         print('the same')
 
-
-def _text(value: Value | None) -> str:
-    return _NONE if value is None else value_text(value)

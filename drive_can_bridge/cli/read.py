@@ -118,11 +118,9 @@ def _shown(outcome: ReadOutcome) -> str:
     """Return a value, and its name beside it."""
     if outcome.value is None:
         return '–'
-    parameter = outcome.parameter
-    if parameter is None:
+    if outcome.parameter is None:
         return value_text(outcome.value)
-    text, name = parameter.text(outcome.value), parameter.name_of(outcome.value)
-    return f'{text} {name}' if name else text
+    return outcome.parameter.named(outcome.value)
 
 
 def _rows(drives: Drives, outcomes: Sequence[tuple[Drive, ReadOutcome]],

@@ -198,11 +198,11 @@ def _show(args: Namespace, backup: Backup, drive: Drive, plan: RestorePlan) -> N
             for each in plan.absent))
     elif differing or plan.absent:
         print_table(_HEADINGS, [
-            (change.name, value_text(change.found),
-             _NONE if change.wanted is None else value_text(change.wanted),
+            (change.name, change.parameter.named(change.found),
+             _NONE if change.wanted is None else change.parameter.named(change.wanted),
              change.parameter.unit, change.note)
             for change in differing] + [
-            (each.name, _NONE, value_text(each.wanted), _unit(drive, each.name),
+            (each.name, _NONE, _named(drive, each.name, each.wanted), _unit(drive, each.name),
              'not there: the drive does not have it')
             for each in plan.absent], numbers=('drive', 'file'))
     for name in backup.values:
@@ -299,7 +299,12 @@ def _print_outcome(drive: Drive, name: str, ok: bool, found: Value | None, wante
 
 
 def _with_unit(drive: Drive, name: str, value: Value) -> str:
-    return f'{value_text(value)} {_unit(drive, name)}'.rstrip()
+    return f'{_named(drive, name, value)} {_unit(drive, name)}'.rstrip()
+
+
+def _named(drive: Drive, name: str, value: Value) -> str:
+    parameter = drive.find(name)
+    return value_text(value) if parameter is None else parameter.named(value)
 
 
 def _unit(drive: Drive, name: str) -> str:

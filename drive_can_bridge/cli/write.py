@@ -161,13 +161,19 @@ def _shown(drive: Drive, outcome: WriteOutcome, text: str) -> Value | str:
 
 
 def _cell(drive: Drive, outcome: WriteOutcome, text: str) -> str:
-    """Return the value for people: as it was typed, unless the drive holds another one."""
+    """
+    Return the value for people: as it was typed, unless the drive holds another one.
+
+    One that has a name is shown with it.
+    """
     parameter = outcome.parameter
     value = None if parameter is None or not outcome.ok else _value(parameter, text)
     if parameter is None or value is None or not parameter.listed:
         return text
-    held = parameter.text(drive.rounded(parameter, value))
-    return text if held == parameter.text(value) else held
+    held = drive.rounded(parameter, value)
+    if parameter.text(held) == parameter.text(value) and not parameter.name_of(held):
+        return text
+    return parameter.named(held)
 
 
 def _expected(parameter: Parameter) -> str:

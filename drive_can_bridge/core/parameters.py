@@ -202,6 +202,10 @@ class Parameter:
         return next((name for raw, name in self.values
                      if self.value_from_raw(raw) == value), '') if self.values else ''
 
+    def named(self, value: Value) -> str:
+        """Return a value for people, with its name beside it if it has one: ``3 bus``."""
+        return f'{self.text(value)} {self.name_of(value)}'.rstrip()
+
     def value_named(self, name: str) -> Value | None:
         """Return the value of a name; None: there is no such name."""
         return next((self.value_from_raw(raw) for raw, known in self.values if known == name),

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Names of values: ``read`` shows them beside the number, ``write`` takes them instead."""
+"""Names of values: commands show them beside the number, and ``write`` takes them instead."""
 
 from collections.abc import Iterator
 import json
@@ -43,6 +43,7 @@ def test_there_and_back(world: World, capsys: pytest.CaptureFixture[str], word: 
     code, said = run(world, capsys, 'write', 'conveyor', f'source={word}')
     assert code == 0, said
     assert world.drives['conveyor'].value('source') == value
+    assert f' {shown} ' in said.splitlines()[1]
     code, said = run(world, capsys, 'read', 'conveyor', 'source')
     assert code == 0
     assert f' {shown} ' in said.splitlines()[1]
@@ -56,3 +57,22 @@ def test_an_unknown_name_is_told_the_known_ones(
     code, said = run(world, capsys, 'write', 'conveyor', 'source=buss')
     assert code == 1
     assert 'an integer or one of terminals, bus, panel of the drive' in said
+
+
+def test_a_backup_is_compared_and_restored_with_names(
+        world: World, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = str(tmp_path / 'backup.yaml')
+    assert run(world, capsys, 'write', 'conveyor', 'source=bus')[0] == 0
+    code, said = run(world, capsys, 'backup', 'conveyor', '-o', file)
+    assert code == 0, said
+    assert '    source: 3  # bus\n' in Path(file).read_text(encoding='utf-8')
+    assert run(world, capsys, 'write', 'conveyor', 'source=panel of the drive')[0] == 0
+    code, said = run(world, capsys, 'compare', file, 'conveyor')
+    assert code == 1
+    assert said.splitlines()[1].split(maxsplit=1)[1].strip() == '3 bus  4 panel of the drive'
+    code, said = run(world, capsys, 'compare', file, 'conveyor', '--json')
+    assert json.loads(said) == {'parameter': 'source', 'unit': '', 'a': 3, 'b': 4}
+    code, said = run(world, capsys, 'restore', file, 'conveyor', '--yes')
+    assert code == 0, said
+    assert said.splitlines()[1].split(maxsplit=1)[1].strip() == '4 panel of the drive  3 bus'
+    assert world.drives['conveyor'].value('source') == 3
