@@ -67,8 +67,8 @@ class Setpoints:
         Handle a command for one setpoint. The newest one wins.
 
         :param active: the bridge is active: then a limit is set, whatever the drive does.
-        :raises ValueRefused: the value cannot be sent. Nothing changes then, the age included; but
-            what may have been meant to be 0 disarms.
+        :raises ValueRefused: the value cannot be sent. Then nothing changes, not even the age.
+            Exception: a value that may have been meant as 0 disarms the setpoint.
         """
         setpoint = self.items[index]
         if is_misplaced_integer(value):

@@ -103,7 +103,7 @@ class DutyRow(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """The outcome of an event for one debt."""
+    """What follows when an event meets a pending stop: the new debt, and what has to be done."""
 
     becomes: Debt
     do: Do

@@ -56,12 +56,12 @@ _SHOWN_OUT = ('HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\n'
 
 class Connection(H11Protocol):
     """
-    A connection. It counts as outside until the gate has found its token.
+    A connection of a browser. It is *outside* until it has sent a valid token, then *inside*.
 
-    Where there are too many outside, the oldest is closed, so that
-    silent ones keep no others out. Inside there is a limit, but not for stops.
+    Of too many outside the oldest is closed, so that silent ones keep nobody else out. The
+    number of those inside is limited, too, but never for a stop.
 
-    :param outside: those that have shown no token yet, the oldest first; of all connections.
+    :param outside: all connections without a token yet, the oldest first.
     """
 
     def __init__(self, outside: dict['Connection', None], access: PanelAccess, *args: Any,

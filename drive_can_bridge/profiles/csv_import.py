@@ -119,7 +119,7 @@ _STORAGE = {
 
 def word_of(what: str, table: Mapping[str, str], text: str) -> str:
     """
-    Return the word of a profile for a word of a manual.
+    Translate a manual's word into the profile's.
 
     :param what: ``type``, ``access``, ``storage``.
     :raises Unusable: it is none of those that are known.

@@ -119,7 +119,7 @@ class AcyclicOutput:
         self.forget_word()
 
     def forget_word(self) -> None:
-        """Record that nobody knows which control word the drive has."""
+        """Mark the control word of the drive as unknown."""
         self.word: int | None = None
         self._ran = False               # the last one before that was no quick stop was enable
         self._repeats = 0

@@ -182,7 +182,11 @@ class CyclicExchange(Generic[TelegramT]):
         return expired
 
     def settle(self, answers: CycleAnswers, now: float) -> None:
-        """End the exchange with one drive, for the next begins; those of a stop are close."""
+        """
+        Close the exchange with one drive, before the next one begins.
+
+        Exchanges of a stop follow each other closely.
+        """
         answers.settle(now, early=self.cycles_left < 0 and answers.book.early(now))
 
     def start(self, now: float, *, in_turn: bool = False) -> None:
