@@ -14,12 +14,18 @@ from typing import Any
 
 #: s
 PERIOD = 0.05
-#: keys of diagnostics that every drive has; ``control_state`` comes with a control word
+#: keys of diagnostics that every bus has
+BUS_KEYS = {
+    'state', 'code', 'load_percent', 'frames_sent', 'frames_received', 'frames_rejected',
+    'error_frames', 'bus_off_count', 'reconnections', 'send_failures'}
+#: that every drive has
 KEYS = {
     'state', 'code', 'exchanges', 'missed_exchanges', 'latency_mean_ms', 'latency_p99_ms',
     'latency_max_ms', 'period_error_mean_ms', 'period_error_p99_ms', 'period_error_max_ms',
     'command_age_s', 'commands_refused', 'frames_rejected', 'late_answers',
     'parameter_requests_ok', 'parameter_requests_failed', 'last_parameter_error'}
+#: of an adapter that keeps frames; with a control word; with section ``fault``; in a broadcast group
+SOMETIMES = {'adapter_latency_ms', 'control_state', 'fault_code', 'broadcast'}
 SAME_EVERYWHERE = """
   ramp_time:
     {number: 102, type: uint16, scale: 0.01, unit: s, access: rw, storage: eeprom, minimum: 0.01,

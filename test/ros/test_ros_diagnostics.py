@@ -1,14 +1,16 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What ``/diagnostics`` says, and that it says what to do."""
 
+import ast
 import math
 from pathlib import Path
+import re
 from typing import Any
 
 from bridges import Bridge, CONVEYOR, HASTY, parameters, StartBridge
 from clients import Client, ERROR, facts, wait_until
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from families import KEYS
+from families import BUS_KEYS, FAMILIES, KEYS, SOMETIMES
 import pytest
 from saying import says
 from waiting import clock
@@ -26,11 +28,9 @@ from drive_can_bridge.transport.failures import with_outlook
 
 BUS, DRIVE = 'drive_can_bridge: bus main', 'drive_can_bridge: drive conveyor'
 OTHER = 'drive_can_bridge: drive other'
-BUS_KEYS = {
-    'state', 'code', 'load_percent', 'frames_sent', 'frames_received', 'frames_rejected',
-    'error_frames',
-    'bus_off_count', 'reconnections', 'send_failures'}
-DRIVE_KEYS = KEYS | {'short_frames', 'fault_code'}
+PACKAGE = Path(diagnostics.__file__).parents[1]
+#: where they are described: a table, keys in its first column
+PAGE = PACKAGE.parent / 'docs' / 'ros_interface.md'
 
 
 def test_names_and_keys(bridge: StartBridge, client: Client) -> None:
@@ -39,9 +39,41 @@ def test_names_and_keys(bridge: StartBridge, client: Client) -> None:
     message = client.topic('/diagnostics', DiagnosticArray).wait()
     assert [status.name for status in message.status] == [BUS, DRIVE, OTHER]
     assert message.header.stamp.sec > 0
-    for status, keys in zip(message.status, (BUS_KEYS, DRIVE_KEYS, DRIVE_KEYS)):
+    of_drive = KEYS | {'short_frames', 'fault_code'}
+    for status, keys in zip(message.status, (BUS_KEYS, of_drive, of_drive)):
         assert keys == {pair.key for pair in status.values}
         assert status.message and status.hardware_id == status.name.rsplit(' ', 1)[1]
+
+
+def keys_in_the_page() -> list[str]:
+    """Return the keys that the page describes, in its order."""
+    table = PAGE.read_text(encoding='utf-8').partition('\n## Diagnostics\n')[2].partition(
+        '\n| key | meaning |\n')[2].partition('\n\n')[0]
+    return [key for row in table.splitlines() for key in re.findall('`(.+?)`', row.split('|')[1])]
+
+
+def keys_in_the_sources() -> set[str]:
+    """Return the keys of all that makes or adds to a status."""
+    found = set[str]()
+    for source in PACKAGE.rglob('*.py'):
+        wanted = 'report' if source == Path(diagnostics.__file__) else 'facts'
+        for function in ast.walk(ast.parse(source.read_text(encoding='utf-8'))):
+            if isinstance(function, ast.FunctionDef) and function.name == wanted:
+                found |= {key.value for table in ast.walk(function) if isinstance(table, ast.Dict)
+                          for key in table.keys
+                          if isinstance(key, ast.Constant) and isinstance(key.value, str)}
+    return found
+
+
+def test_the_page_describes_every_key() -> None:
+    described = keys_in_the_page()
+    families = set[str]().union(*(family.diagnostics for family in FAMILIES))
+    assert set(described) == BUS_KEYS | KEYS | families | SOMETIMES
+    # of a bus and of a drive it is not the same
+    assert {key for key in described if described.count(key) > 1} == {'frames_rejected'}
+    times = {f'{name}_{what}_ms' for name in ('latency', 'period_error')
+             for what in ('mean', 'p99', 'max')}
+    assert keys_in_the_sources() == set(described) - times
 
 
 def test_times_and_frames_of_a_drive_that_works(bridge: StartBridge, client: Client) -> None:
