@@ -24,7 +24,7 @@ KEYS = {
     'latency_max_ms', 'period_error_mean_ms', 'period_error_p99_ms', 'period_error_max_ms',
     'command_age_s', 'commands_refused', 'frames_rejected', 'late_answers',
     'parameter_requests_ok', 'parameter_requests_failed', 'last_parameter_error'}
-#: of an adapter that keeps frames; with a control word; with section ``fault``; in a broadcast group
+#: of an adapter that keeps frames; with a control word; section ``fault``; a broadcast group
 SOMETIMES = {'adapter_latency_ms', 'control_state', 'fault_code', 'broadcast'}
 SAME_EVERYWHERE = """
   ramp_time:
