@@ -29,9 +29,17 @@ no_such_drive = 'no such drive; there are: {there}'
 has_no_drives = 'has no drives: it is not configured'
 
 # -- which bridges there are
-no_bridge_running = 'no configured bridge is running{where} (ROS domain {domain})'
-no_bridge_answers = ('no bridge answers{where} (ROS domain {domain}): {silent} {do} not, for '
-                     '{waited:.0f} s (the computer may be busy)')
+no_bridge_running = 'no configured bridge is running {where}'
+no_bridge_start_one = f'{no_bridge_running}: start one'
+bridge_elsewhere = ('a bridge of this host runs in ROS domain {others}: export '
+                    'ROS_DOMAIN_ID={first}')
+bridge_elsewhere_stops = ('a bridge of this host runs in ROS domain {others}: `drive_can stop` '
+                          'without a name stops it, too; for the rest export '
+                          'ROS_DOMAIN_ID={first}')
+no_bridge_but_elsewhere = f'{no_bridge_running}; {bridge_elsewhere}'
+no_bridge_but_elsewhere_stops = f'{no_bridge_running}; {bridge_elsewhere_stops}'
+no_bridge_answers = ('no bridge answers {where}: {silent} {do} not, for {waited:.0f} s (the computer '
+                     'may be busy)')
 domain_impossible = '{variable} is {domain}, allowed are 0 to {most}'
 
 # -- the local way

@@ -96,6 +96,8 @@ def _show(source: ModelSource, model: Model, watcher: SignalWatcher, args: argpa
           refusal: _Refusal) -> int:
     clock: Clock = args.clock
     place = environment.in_words()
+    # a demo starts its bridge itself
+    elsewhere = '' if args.title != _TITLE else environment.elsewhere(args.namespace or None)
     if (not args.json and sys.stdout.isatty()
             and os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown')):
         try:
@@ -110,13 +112,14 @@ def _show(source: ModelSource, model: Model, watcher: SignalWatcher, args: argpa
             setting = ViewSetting(
                 args.title, place, args.namespace,
                 tuple(filter(None, (environment.activate_command(),
-                                    environment.export_command()))), bridge)
+                                    environment.export_command()))), bridge, elsewhere)
             code = show(source, model, setting, clock, ended=lambda: watcher.signalled,
                         quit_code=args.quit_code, notice=refusal)
             for text in balance(model.look(clock.now(), 1e-9 * clock.stamp())):
                 print(text)
             return code
-    print(f'{args.title}: {place}', file=sys.stderr, flush=True)
+    for words in filter(None, (place, elsewhere)):
+        print(f'{args.title}: {words}', file=sys.stderr, flush=True)
     return _print_lines(source, model, watcher, clock, as_json=args.json)
 
 

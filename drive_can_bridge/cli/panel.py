@@ -85,7 +85,8 @@ def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
     def ready() -> None:
         nonlocal served
         served = True
-        print(f'{COMMAND}: {place}', file=sys.stderr)
+        for words in filter(None, (place, environment.elsewhere(args.namespace or None))):
+            print(f'{COMMAND}: {words}', file=sys.stderr)
         if not is_loopback(args.host):
             print(f'{COMMAND}: listens on {args.host}: who reaches this machine and has a '
                   f'token gets in, and who sees the traffic sees the token (no TLS); '

@@ -104,7 +104,8 @@ def answers(local: LocalStop, ros: WithoutRos | None, namespace: str | None,
     if not known and (not told or not own and ros is not None):
         from drive_can_bridge.process.environment import no_bridge     # takes its time
         # those of other domains may be all that there are, or discovery was too slow
-        told.append(Answer('', bool(told), no_bridge(namespace), bridge=True))
+        told.append(Answer('', bool(told), no_bridge(namespace, others_answer=bool(told)),
+                           bridge=True))
     return told or [Answer(name, False, host_texts.has_no_drives, bridge=True)
                     for name in known]
 

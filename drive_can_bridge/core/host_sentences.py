@@ -32,9 +32,13 @@ no_such_drive = Text(host_texts.no_such_drive, do='use one of these names')
 has_no_drives = Text(
     host_texts.has_no_drives, do='see the log of the bridge: why it is not configured')
 no_bridge_running = Text(
-    host_texts.no_bridge_running,
-    do='start a bridge; see whether ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE are the same '
-       'there')
+    host_texts.no_bridge_running, host_texts.no_bridge_start_one,
+    host_texts.no_bridge_but_elsewhere, host_texts.no_bridge_but_elsewhere_stops,
+    do='start a bridge, or export the ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE of the one '
+       'that runs')
+bridge_elsewhere = Text(
+    host_texts.bridge_elsewhere, host_texts.bridge_elsewhere_stops,
+    do='export that ROS_DOMAIN_ID in this shell, and start the command again')
 no_bridge_answers = Text(host_texts.no_bridge_answers, do=_HANGS)
 domain_impossible = Text(host_texts.domain_impossible, do='set that variable to such a number')
 

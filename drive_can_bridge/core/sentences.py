@@ -1154,7 +1154,7 @@ no_drive_there = Text(
     fields='drive there near',
     do='use one of the names')
 no_bridge_or_file = Text(
-    '{why}: start one, or name its file with --params-file to talk to the drives directly',
+    '{why}, or name its file with --params-file to talk to the drives directly',
     do='start a bridge, or give --params-file')
 several_bridges = Text(
     'several bridges are running: {names:, }; choose one with --namespace',

@@ -8,6 +8,7 @@ import shlex
 import sys
 
 from drive_can_bridge import host_texts
+from drive_can_bridge.process.presence import bridges, own_domain, switched_on
 
 DOMAIN_ID = 'ROS_DOMAIN_ID'
 DISCOVERY_RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
@@ -75,17 +76,55 @@ def activate_command() -> str:
             if sys.prefix != sys.base_prefix and script.is_file() else '')
 
 
-def no_bridge(namespace: str | None, silent: Sequence[str] = (), waited: float = 0.0) -> str:
+def elsewhere(namespace: str | None = None) -> str:
     """
-    Return that there is no bridge, or none that answers.
+    Return that bridges of this host run in other ROS domains only; '' where they do not.
+
+    :param namespace: in which they are, or a pattern of some; None: anywhere.
+    """
+    others = _other_domains(namespace)
+    return '' if not others else _text_elsewhere(
+        host_texts.bridge_elsewhere, host_texts.bridge_elsewhere_stops, others)
+
+
+def _other_domains(namespace: str | None) -> list[int]:
+    """Return in which domains bridges of this host run; none where one is in this domain."""
+    domain = own_domain()
+    there = {each.domain for each in bridges() if each.may_be_in(namespace)}
+    known = sorted(there.difference((None,)))
+    return [] if domain in known else known
+
+
+def _text_elsewhere(plain: str, stops: str, domains: Sequence[int], **fields: str) -> str:
+    """
+    Return a text about bridges in other domains.
+
+    :param stops: the text where a stop without a name reaches them.
+    """
+    return (stops if switched_on() else plain).format(
+        others=' and '.join(map(str, domains)), first=domains[0], **fields)
+
+
+def no_bridge(namespace: str | None, silent: Sequence[str] = (), waited: float = 0.0, *,
+              others_answer: bool = False) -> str:
+    """
+    Return that there is no bridge, or none that answers, and what to do.
 
     :param silent: those that do not answer.
+    :param others_answer: the command reached those of other domains: nothing is to be done.
     :param waited: for so many s.
     """
-    where = '' if namespace is None else f' in namespace {namespace or "/"}'
-    domain = os.environ.get(DOMAIN_ID) or '0'
+    where = '' if namespace is None else f'in namespace {namespace or "/"} '
+    where += f'(ROS domain {os.environ.get(DOMAIN_ID) or "0"})'
     if silent:
         return host_texts.no_bridge_answers.format(
-            where=where, domain=domain, silent=', '.join(silent),
+            where=where, silent=', '.join(silent),
             do='does' if len(silent) == 1 else 'do', waited=waited)
-    return host_texts.no_bridge_running.format(where=where, domain=domain)
+    if others_answer:
+        return host_texts.no_bridge_running.format(where=where)
+    others = _other_domains(namespace)
+    if others:
+        return _text_elsewhere(
+            host_texts.no_bridge_but_elsewhere, host_texts.no_bridge_but_elsewhere_stops, others,
+            where=where)
+    return host_texts.no_bridge_start_one.format(where=where)

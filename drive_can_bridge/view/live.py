@@ -227,6 +227,7 @@ class ViewSetting:
     :param namespace: that it is limited to, or ''.
     :param environment: commands for another terminal to see the same.
     :param bridge: command that starts one; '': one is being started.
+    :param elsewhere: where other bridges run that are not seen here, and what to do; or ''.
     """
 
     title: str = 'drive_can monitor'
@@ -234,6 +235,7 @@ class ViewSetting:
     namespace: str = ''
     environment: tuple[str, ...] = ()
     bridge: str = 'ros2 run drive_can_bridge drive_can_bridge'
+    elsewhere: str = ''
 
 
 class _Frame:
@@ -373,6 +375,8 @@ def _nobody(frame: _Frame, snapshot: Snapshot, setting: ViewSetting) -> None:
         told = wrapped(f'No bridge{where} yet. Looking for one in {setting.place or "ROS"}: '
                        f'whatever publishes /diagnostics as a drive_can_bridge does.',
                        frame.inner)
+        if setting.elsewhere:
+            told += [Text(), *wrapped(setting.elsewhere, frame.inner, 'bold')]
         if setting.bridge:
             told += [Text(), Text('To start one, in another terminal:')]
             for command in (*setting.environment,

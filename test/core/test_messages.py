@@ -188,7 +188,10 @@ def test_every_row_is_said() -> None:
 def test_what_may_import_no_catalogue_says_rows_of_it() -> None:
     texts = {name: text for name, text in vars(host_texts).items()
              if isinstance(text, str) and not name.startswith('_')}
-    assert texts == {code: row.texts[0] for code, row in host_sentences.CODES.items()}
+    rows = host_sentences.CODES
+    assert {code: row.texts[0] for code, row in rows.items()} == {
+        code: texts[code] for code in rows}
+    assert sorted(texts.values()) == sorted(text for row in rows.values() for text in row.texts)
 
 
 def named(files: Iterable[Path], *functions: str) -> Iterator[str]:

@@ -53,6 +53,11 @@ def test_nobody_starts_a_bridge_that_is_being_started() -> None:
         assert 'ros2 run' not in told
 
 
+def test_a_view_in_the_wrong_domain_says_where_bridges_run() -> None:
+    told = plain(seen(Model()), Choice(), 100, 30, ViewSetting(elsewhere='one runs elsewhere'))
+    assert 'one runs elsewhere' in told
+
+
 def test_a_load_that_is_no_number_ends_no_view() -> None:
     snapshot = seen(model_of([bus_status(load_percent='inf'), drive_status()]))
     assert 'load   0.0 % ' in plain(snapshot, Choice(), 100, 30)

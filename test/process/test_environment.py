@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from drive_can_bridge.process import environment
+from drive_can_bridge.process.presence import Present
 
 
 @pytest.fixture
@@ -37,6 +38,26 @@ def test_what_is_told(clean: pytest.MonkeyPatch, given: dict[str, str], domain: 
         clean.setenv(name, value)
     environment.prepare(domain)
     assert (environment.in_words(), environment.export_command()) == (words, export)
+
+
+@pytest.mark.parametrize(('domains', 'reached', 'words'), [
+    ((), True, ''), ((5, 31), True, ''), ((None,), True, ''),
+    ((31,), True, 'a bridge of this host runs in ROS domain 31: `drive_can stop` without a name '
+                  'stops it, too; for the rest export ROS_DOMAIN_ID=31'),
+    ((31, 7), False, 'a bridge of this host runs in ROS domain 7 and 31: export ROS_DOMAIN_ID=7'),
+])
+def test_bridges_that_run_in_other_domains_only(
+        clean: pytest.MonkeyPatch, domains: tuple[int | None, ...], *, reached: bool,
+        words: str) -> None:
+    clean.setenv('ROS_DOMAIN_ID', '5')
+    clean.setenv('DRIVE_CAN_LOCAL', '' if reached else 'off')
+    clean.setattr(environment, 'bridges', lambda: [
+        Present(1, domain, '/cell/bridge', 1) for domain in domains])
+    assert environment.elsewhere() == environment.elsewhere('/cell') == words
+    assert environment.elsewhere('/hall') == ''
+    assert environment.no_bridge('/cell') == (
+        'no configured bridge is running in namespace /cell (ROS domain 5)'
+        + (f'; {words}' if words else ': start one'))
 
 
 @pytest.mark.parametrize(('given', 'refused'), [

@@ -11,7 +11,7 @@ import pytest
 
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.client import local
-from drive_can_bridge.process import local_stop
+from drive_can_bridge.process import environment, local_stop
 from drive_can_bridge.process.local_server import LocalRequest
 from drive_can_bridge.process.local_way import Inbound, packets_of, VERSION
 from drive_can_bridge.process.presence import bridges, Present, SWITCH
@@ -23,7 +23,7 @@ Run = Callable[..., tuple[int, list[str], str]]
 def command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
     """Return what runs a command, and returns exit code, lines, and standard error."""
     # others may use this host meanwhile
-    for module in (local_stop, local, search):
+    for module in (local_stop, local, search, environment):
         monkeypatch.setattr(module, 'bridges', lambda: [
             each for each in bridges() if each.process == os.getpid()])
 

@@ -98,6 +98,13 @@ def test_where_only_other_domains_have_bridges_it_is_said_that_this_one_has_none
     assert run('stop') == (0, [
         f'[domain {domain}] b/lift: ready',
         f'no configured bridge is running (ROS domain {domain + 1})'], '')
+    # a name means this domain: whoever forgot an export is told of the other one
+    none = (f'no configured bridge is running (ROS domain {domain + 1}); a bridge of this host '
+            f'runs in ROS domain {domain}: `drive_can stop` without a name stops it, too; for the '
+            f'rest export ROS_DOMAIN_ID={domain}')
+    assert run('stop', 'lift') == (1, [f'NOT STOPPED: {none}'], '')
+    assert run('enable', 'lift') == (1, [], f'drive_can enable: {none}\n')
+    assert json.loads(run('stop', 'lift', '--json')[1][0])['code'] == 'no_bridge_running'
 
 
 def test_one_that_hangs_is_named_after_a_second(
