@@ -49,8 +49,8 @@ drive_can explain not_armed bus_up
 drive_can explain "conveyor: read ramp_time (P30): no answer in 0.1 s, 3 attempts"
 ```
 
-In `<brackets>` stands what changes; several texts of a code are its forms. `messages.md#not_armed`
-leads to the row of that code.
+In `<brackets>` stands what changes; several texts of a code are its forms. Where the last column is
+empty, the text itself says what is allowed. `messages.md#not_armed` leads to the row of that code.
 
 Made by `python -m drive_can_bridge.cli.explain`, of the rows that `core/codes.py` names.
 """
@@ -207,7 +207,7 @@ def page() -> str:
         for title, rows in sections:
             lines += ['', f'## {title}', *_TABLE]
             lines += [f'| <a id="{prefix}{row.code}"></a>`{row.code}` | {_cell(row)} | '
-                      f'{_escaped(row.do)} |' for row in rows]
+                      f'{_escaped(row.do) if row.has_advice else ""} |' for row in rows]
     return re.sub('\n{3,}', '\n\n', '\n'.join(lines)) + '\n'
 
 

@@ -124,7 +124,8 @@ def _checked(drive: Drive, name: str, text: str) -> tuple[Value, str]:
         return 0, drive.check(name, 0)
     value = _value(parameter, text)
     if value is None:
-        return 0, f'wrong type: {text!r}, expected {_expected(parameter)}'
+        return 0, drive.write_refusal(name, parameter) or (
+            f'wrong type: {text!r}, expected {_expected(parameter)}')
     return value, drive.check(name, value)
 
 

@@ -15,7 +15,7 @@ from drive_can_bridge.core.errors import NoAnswer
 from drive_can_bridge.core.parameters import (
     AccessMode, Parameter, ParameterType as WireType, Storage, Value, ValueKind)
 from drive_can_bridge.core.requests import kind_of
-from drive_can_bridge.core.roles import Role
+from drive_can_bridge.core.roles import controlled_by, Role
 from drive_can_bridge.core.text import facts_in, printable, taken_apart
 
 if TYPE_CHECKING:   # read it is not needed
@@ -117,7 +117,7 @@ class BridgedDrive(Drive):
     def write_refusal(self, name: str, parameter: Parameter) -> str:
         role = self.role(name)
         if parameter.writable and role is Role.CONTROL:
-            return sentences.use_enable()
+            return controlled_by(parameter)
         if parameter.writable and role is Role.CYCLIC:
             own = next((each.name for each in self._directory.twins(parameter)), name)
             return sentences.sent_cyclically(own)

@@ -30,7 +30,7 @@ from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.requests import (
     Failure, FailureKind, is_answer, Outcome, ReadRequest, ReadValue, Request, WriteRequest,
     Written)
-from drive_can_bridge.core.roles import Role
+from drive_can_bridge.core.roles import controlled_by, Role
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.exchange.member import DriveListener
@@ -259,7 +259,9 @@ class DirectDrive(Drive):
             return ''   # which its value is told
         owner = self._session.roles.owner(parameter)
         if owner is not None and owner[0] is Role.CONTROL:
-            return sentences.bridge_sends_word()
+            refusal = controlled_by(owner[1])
+            return (sentences.bridge_sends_word() if refusal.row is sentences.use_enable
+                    else refusal)
         if owner is not None and owner[0] is Role.CYCLIC:
             return sentences.bridge_sends_setpoint(name=owner[1].name)
         return self._session.services.write_refusal(parameter)

@@ -148,7 +148,7 @@ internal_error_of_command = Text(
 extra_missing = Text(
     '{command}: the Python module {module} is not installed: {how}',
     do='run that command')
-no_text = Text('is no text: it contains NUL characters', do='export the table as CSV, in UTF-8')
+no_text = Text('is not a text file: it contains NUL characters', do='export the table as CSV, in UTF-8')
 no_such_text = Text(
     'begins like {encoding} text and is none: byte {byte} ({reason})',
     do='export the table as CSV, in UTF-8')
@@ -364,7 +364,7 @@ trc_length_differs = Text(
     'its length is {length}, and there are {found} data bytes',
     do='nothing: the rest is read')
 trc_start_time = Text(
-    '$STARTTIME is no number of days: {value}',
+    '$STARTTIME is not a number of days: {value}',
     do='correct that line, or save it again')
 nothing_to_plot = Text(
     'nothing to plot: none of these values is in the trace',
@@ -492,7 +492,7 @@ no_object_section = Text('is no section of an object', do='nothing')
 object_not_understood = Text('is no object that can be understood', do='correct it by the manual')
 decimal_or_grouping = Text("'{text}' may be {one:g} or {other}: say which with --decimal")
 no_range = Text("'{text}' is no range", do='write it as 0 … 100, or as two columns')
-scale_zero = Text("'{text}' is no scale: 0", do='correct it by the manual')
+scale_zero = Text("'{text}': a scale must not be 0", do='correct it by the manual')
 divides_by_zero = Text("'{text}' divides by zero", do='correct it by the manual')
 
 # -- traces and imports: which channel, which column, which axis ----------------------------------

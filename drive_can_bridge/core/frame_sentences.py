@@ -71,7 +71,8 @@ broadcast_of_others = Text(
 fewer_values = Text(
     '{found} values, {needed} needed; {remark}',
     do='compare cyclic_response with the settings of the inverter')
-said_unasked = Text('{remark}, told without being asked', do='nothing: a fault is told at once')
+said_unasked = Text(
+    '{remark}, sent by the drive without a request', do='nothing: a fault is sent at once')
 response_to_task = Text('response {response} to task {task}', do='see the manual of the inverter')
 same_function_byte = Text(
     'the function byte is that of the request before: nothing is started',

@@ -95,6 +95,7 @@ class Text:
 
     :ivar code: its name in the catalogue.
     :ivar do: what people should do about it.
+    :ivar has_advice: that is of this row, and not of all of its catalogue.
     :param fields: that order, where it is not that of the text, or where a field is in no text.
     :param kinds: what its sentences are for programs: one for all texts, or one for each.
     :param how: writes a field in a way of its own, by name.
@@ -103,6 +104,7 @@ class Text:
     def __init__(self, *texts: str, do: str = '', fields: str = '', kinds: Sequence[Enum] = (),
                  **how: Callable[[Any], str]) -> None:
         self.code, self.do, self.texts = '', do, texts
+        self.has_advice = bool(do)
         self._order, self._kinds, self._how = fields, kinds, how
 
     # made at the first use: a command writes one sentence of some hundreds

@@ -19,6 +19,8 @@ from drive_can_bridge.core.parameters import Parameter
 if TYPE_CHECKING:   # a command that wants to know a role needs no configuration
     from drive_can_bridge.core.configuration import DriveConfiguration
 
+#: index of the mode of operation, which servos are controlled by beside their control word
+_MODE = 0x6060
 #: cells that a parameter addresses; empty: none that acyclic frames reach
 Cells = frozenset[Hashable]
 
@@ -39,6 +41,15 @@ def by_number(parameter: Parameter) -> Cells:
 def publish_it(parameter: Parameter) -> Sentence:
     """Return why a setpoint is not written by request."""
     return sentences.sent_cyclically(parameter.name)
+
+
+def controlled_by(own: Parameter) -> Sentence:
+    """
+    Return why what a drive is controlled by is not written by request.
+
+    :param own: as the bridge writes it.
+    """
+    return sentences.bridge_sets_mode() if own.index == _MODE else sentences.use_enable()
 
 
 class Roles:
@@ -100,7 +111,7 @@ class Roles:
         """
         role, own = self.owner(parameter) or (None, parameter)
         if role is Role.CONTROL:
-            return sentences.use_enable()
+            return controlled_by(own)
         if role is Role.CYCLIC:
             return self._cyclic_refusal(own)
         if role is Role.MAP and exchanging:

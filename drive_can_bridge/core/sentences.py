@@ -119,6 +119,9 @@ unknown_parameter = Text(
     'unknown parameter {name}',
     do='use a name of the profile, or a raw one')
 use_enable = Text('use ~/enable', do='call the service; the control word is not written by hand')
+bridge_sets_mode = Text(
+    'the bridge sets the mode: key mode of the drive in the parameter file',
+    do='change that key, and start the bridge again; the drive gets it before its first cycle')
 sent_cyclically = Text(
     'sent cyclically: publish ~/command/{name}',
     do='publish it: the bridge sends it each cycle')
@@ -330,9 +333,10 @@ status_missing = Text(
     '{answers} answers without a status word',
     do='see why the answers of the drive are short')
 disregards = Text(
-    'still {state} ({status}) although its control word is {action} ({word:04X}h): stop it by '
-    'other means, or set a control_timeout longer than its ramp',
-    do='stop it by other means; see whether the drive takes its control word from the bus '
+    'does not obey {action} ({word:04X}h): stop it by other means; still {state} ({status}); '
+    'where its ramp is longer than control_timeout, set that longer',
+    fields='state status action word',
+    do='stop it by other means; then see whether the drive takes its control word from the bus '
        '(local control, inputs)')
 
 # -- defects of this program ----------------------------------------------------------------------
@@ -958,7 +962,7 @@ being_stopped = Text('the bridge is being stopped', do='start the bridge again w
 transition_failed = Text(
     '{name} failed: {kind}: {text}',
     do='report it, with the log of the bridge')
-nameless_parameter = Text('a parameter has a name', do='give the parameter a name')
+nameless_parameter = Text('a parameter has no name', do='give the parameter a name')
 no_such_type = Text(
     'type {number} does not exist',
     do='send one of the types of rcl_interfaces/msg/ParameterType')
@@ -1106,7 +1110,8 @@ publisher_incompatible = Text(
     do='have its publisher use the QoS of the topic (docs/ros_interface.md)')
 command_late = Text(
     'command on {topic} thrown away: it came {seconds:.2f} s later than others have',
-    do='see what slows the network, or the publisher, down')
+    do='see whether a clock was set (of this computer, or of its publisher), and what slows the '
+       'network, or the publisher, down')
 joint_states_unpublished = Text(
     'joint_states cannot be published: {reason}',
     do='report it, with the version of the middleware')

@@ -131,8 +131,9 @@ def test_what_a_servo_is_controlled_and_mapped_by() -> None:
     word = Parameter('word', index=0x6040, subindex=0)
     timer = Parameter('timer', index=0x1800, subindex=5)
     one = session('cia402', word, timer, mode='vl')
-    for name in ('word', 'x6040.0', 'x6060.00'):
-        assert one.services.write_refusal(raw(one, name)) == 'use ~/enable', name
+    for name, refusal in (('word', 'use_enable'), ('x6040.0', 'use_enable'),
+                          ('x6060.00', 'bridge_sets_mode')):
+        assert one.services.write_refusal(raw(one, name)).code == refusal, name
         assert one.roles.role(raw(one, name)) is Role.CONTROL, name
     maps = ('timer', 'x1400.1', 'x1bff.2', 'x1005.0', 'x1006.0', 'x1016.1', 'x1017.0', 'x60c2.2')
     for name in maps:

@@ -127,7 +127,7 @@ def test_one_row(tmp_path: Path, heading: str, row: str, expected: dict[str, Any
 
 @pytest.mark.parametrize(('row', 'reason'), [
     ('2;b;rpm;1;10;5;rw;int16', 'minimum 10 is above maximum 5'),
-    ('2;b;rpm;0;;;rw;int16', "'0' is no scale: 0"),
+    ('2;b;rpm;0;;;rw;int16', "'0': a scale must not be 0"),
     ('2;b;rpm;1;x;;rw;int16', "'x' is no number"),
     ('2;b;rpm;1;P105;;rw;int16', "'P105' is no number"),
     ('2;b;s;1;10 ms;;rw;int16', "minimum '10 ms' is not in s"),
@@ -230,7 +230,7 @@ def test_columns_that_are_not_there(tmp_path: Path, columns: str) -> None:
     (b'Name;Unit\na;s\n', 'its headings are: Name, Unit'),
     (b'PK\x03\x04rest', 'is a workbook or an archive; save its table as CSV'),
     (b'%PDF-1.7', 'is a PDF; copy its table into a spreadsheet and save that as CSV'),
-    (b'a\0b', 'is no text: it contains NUL characters'),
+    (b'a\0b', 'is not a text file: it contains NUL characters'),
     (b'\xff\xfea', 'begins like utf-16 text and is none'),
     (b'"Nr;Name\n1;a\n2;b\n', 'table.csv: in line 1 a quote opens that is never closed'),
     (b'No.;Name\n1;Ramp\n2;"Current\n3;Speed\n', 'in line 3 a quote opens that is never closed'),

@@ -193,7 +193,7 @@ def test_a_start_of_peak_that_is_none(tmp_path: Path) -> None:
         records, complaints = peak(tmp_path, f';$FILEVERSION=1.1\n;$STARTTIME={start}\n',
                                    '1) 500.0 Rx 0705 1 05')
         assert ([each.time for each in records], complaints) == (
-            [0.5], [f"line 2: $STARTTIME is no number of days: '{start}'"])
+            [0.5], [f"line 2: $STARTTIME is not a number of days: '{start}'"])
 
 
 def test_messages_of_several_frames_are_counted(tmp_path: Path) -> None:
