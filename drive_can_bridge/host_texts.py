@@ -38,8 +38,8 @@ bridge_elsewhere_stops = ('a bridge of this host runs in ROS domain {others}: `d
                           'ROS_DOMAIN_ID={first}')
 no_bridge_but_elsewhere = f'{no_bridge_running}; {bridge_elsewhere}'
 no_bridge_but_elsewhere_stops = f'{no_bridge_running}; {bridge_elsewhere_stops}'
-no_bridge_answers = ('no bridge answers {where}: {silent} {do} not, for {waited:.0f} s (the computer '
-                     'may be busy)')
+no_bridge_answers = ('no bridge answers {where}: {silent} {do} not, for {waited:.0f} s (the '
+                     'computer may be busy)')
 domain_impossible = '{variable} is {domain}, allowed are 0 to {most}'
 
 # -- the local way

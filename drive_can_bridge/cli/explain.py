@@ -49,8 +49,8 @@ drive_can explain not_armed bus_up
 drive_can explain "conveyor: read ramp_time (P30): no answer in 0.1 s, 3 attempts"
 ```
 
-In `<brackets>` stands what changes; several texts of a code are its forms. Where the last column is
-empty, the text itself says what is allowed. `messages.md#not_armed` leads to the row of that code.
+In `<brackets>` stands what changes; several texts of a code are its forms. Where the last column
+is empty, the text says what is allowed. `messages.md#not_armed` leads to the row of that code.
 
 Made by `python -m drive_can_bridge.cli.explain`, of the rows that `core/codes.py` names.
 """

@@ -53,7 +53,9 @@ port_in_use = Text(
 in_use = Text(
     '{what} is used by {process}; {advice}',
     do='end that process, or let it do what is wanted: a drive has one master')
-wait_or_end = Text('wait until it is done, or end it', do='wait, or end that process (behind a text that names it)')
+wait_or_end = Text(
+    'wait until it is done, or end it',
+    do='wait, or end that process (stands behind a text that names it)')
 gateway_silent = Text(
     '{gateway} does not answer',
     do='see whether socketcand runs there, and whether a firewall lets its port through')

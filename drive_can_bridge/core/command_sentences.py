@@ -148,7 +148,8 @@ internal_error_of_command = Text(
 extra_missing = Text(
     '{command}: the Python module {module} is not installed: {how}',
     do='run that command')
-no_text = Text('is not a text file: it contains NUL characters', do='export the table as CSV, in UTF-8')
+no_text = Text('is not a text file: it contains NUL characters',
+               do='export the table as CSV, in UTF-8')
 no_such_text = Text(
     'begins like {encoding} text and is none: byte {byte} ({reason})',
     do='export the table as CSV, in UTF-8')

@@ -21,8 +21,9 @@ _NAMES_MAX, _NAMES_NEAREST = 8, 4
 THE_CONTROL_WORD = 'the control word, which the bridge sends by itself'
 
 # -- what may be meant instead
-did_you_mean = Text("did you mean '{word}'?", do='write that word (behind a text that says what is wrong)')
-near = Text(" (did you mean '{word}'?)", do='write that word')
+did_you_mean = Text("did you mean '{word}'?", do='write that word')
+near = Text(" (did you mean '{word}'?)",
+            do='write that word (stands behind a text that says what is wrong)')
 allowed = Text('allowed: {words}', do='write one of these')
 some_allowed = Text(
     'allowed are for example {words}; all: drive_can profile show {profile}',

@@ -21,6 +21,7 @@ from drive_can_bridge.cli.main import main
 from drive_can_bridge.client import open_drives
 from drive_can_bridge.client.direct import DirectDrive
 from drive_can_bridge.client.drive import WriteOutcome
+from drive_can_bridge.core import sentences
 
 #: why nobody is asked
 REFUSED = {
@@ -126,6 +127,17 @@ def test_numbers_are_written_as_in_files(run: Run, world: World, text: str,
         (1, 3.25) if value is None else (0, value))
     if value is None:
         assert f'wrong type: {text!r},' in lines[1]
+
+
+def test_a_mode_is_the_bridges_whatever_is_written(run: Run, tmp_path: Path) -> None:
+    axis = {'bus': 'main', 'protocol': 'cia402', 'station': 7, 'profile': 'cia402_servo',
+            'mode': 'pv', 'cyclic_request': ['target_velocity']}
+    with a_world(tmp_path, axis=axis) as single:
+        for text in ('csv', '9', 'fast'):
+            code, lines, _ = run('write', 'axis', f'mode={text}', file=single.file)
+            assert code == 1 and f'not written: {sentences.bridge_sets_mode()}' in lines[1]
+        assert sentences.bridge_sends_word() in run(
+            'write', 'axis', 'x6040.0=6', file=single.file)[1][1]
 
 
 @pytest.mark.parametrize(('name', 'text', 'value'), [
