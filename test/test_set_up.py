@@ -7,9 +7,13 @@ instead of it something that only writes down what was to be installed. Whatever
 package that somebody added is lost.
 """
 
+from contextlib import suppress
+from itertools import islice
 import os
 from pathlib import Path
+import re
 import shutil
+import signal
 import subprocess
 import sys
 
@@ -23,6 +27,11 @@ import os, pathlib, sys
 with open(os.environ['INSTALLED'], 'a') as file:
     print(pathlib.Path(sys.prefix).name, sys.argv[-1], file=file)
 (pathlib.Path(sys.prefix) / 'bin' / 'drive_can').write_text(f'#!{sys.executable}')
+for line in os.environ.get('PIP_SAYS', '').splitlines():
+    if line == 'wait':      # until somebody has looked
+        open(os.environ['INSTALLED'] + '.go').close()
+    else:
+        print(line, flush=True)
 sys.exit(int(os.environ.get('PIP_FAILS', 0)))
 """
 VENV = """
@@ -60,17 +69,21 @@ class Checkout:
     def run(self, *command: str, python: str = sys.executable, ros: str = '', wheels: str = '',
             fails: bool = False) -> subprocess.CompletedProcess[str]:
         """Run a command of ``.ci``; with a sourced ROS 2, other wheels, or a pip that fails."""
-        path = [str(self.place / each) for each in ('pip', *(('ros',) if ros else ()))]
-        inherited = {name: value for name, value in os.environ.items()
-                     if name not in ('ROS_DISTRO', 'ROS_DISTRO_WHEELS', 'VIRTUAL_ENV',
-                                  'PYTHONHOME')}
         return subprocess.run(
             [self.top / '.ci' / command[0], *(python,)[:command[0] == 'setup'], '.venv',
              *command[1:]],
-            env={**inherited, 'PYTHONPATH': os.pathsep.join(path), 'PIP_FAILS': str(int(fails)),
-                 'INSTALLED': str(self.installed), **({'ROS_DISTRO': ros} if ros else {}),
+            env={**self.environment(ros), 'PIP_FAILS': str(int(fails)),
                  **({'ROS_DISTRO_WHEELS': wheels} if wheels else {})},
             text=True, capture_output=True, check=False)
+
+    def environment(self, ros: str = '') -> dict[str, str]:
+        """Return the environment of its commands; with a sourced ROS 2."""
+        path = [str(self.place / each) for each in ('pip', *(('ros',) if ros else ()))]
+        inherited = {name: value for name, value in os.environ.items()
+                     if name not in ('ROS_DISTRO', 'ROS_DISTRO_WHEELS', 'VIRTUAL_ENV',
+                                     'PYTHONHOME')}
+        return {**inherited, 'PYTHONPATH': os.pathsep.join(path),
+                'INSTALLED': str(self.installed), **({'ROS_DISTRO': ros} if ros else {})}
 
     def set_up(self, *part: str, python: str = sys.executable, ros: str = '',
                wheels: str = '') -> str:
@@ -226,6 +239,30 @@ def test_progress_and_failure_in_words(checkout: Checkout) -> None:
     assert failed.returncode == 1 and not failed.stdout
     assert 'could not install; the whole story is in .venv/setup.log' in failed.stderr
     assert 'done after' in checkout.run('setup', 'demo').stderr
+
+
+def test_progress_never_stands_still(checkout: Checkout) -> None:
+    """The folder does not grow while pip fetches, which is everything before it installs any."""
+    gate = Path(f'{checkout.installed}.go')
+    os.mkfifo(gate)
+    says = ('Collecting a\n  Downloading a.whl (1 MB)\nCollecting b\nwait\n'
+            'Installing collected packages: a, b\nwait')
+    with subprocess.Popen(
+            [checkout.top / '.ci' / 'setup', sys.executable, '.venv', 'demo'],
+            env={**checkout.environment(), 'PIP_SAYS': says, 'SETUP_PAUSE': '0.05'},
+            text=True, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL,
+            start_new_session=True) as setting_up:
+        assert setting_up.stderr is not None
+        try:
+            for wanted in (r'setup: \d+ s, fetching: 3 files so far',
+                           r'setup: \d+ s, installing: \d+ MB so far'):
+                lines = islice(setting_up.stderr, 200)
+                assert any(re.match(wanted, line) for line in lines)
+                gate.write_text('')
+            assert setting_up.wait() == 0
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(setting_up.pid, signal.SIGKILL)
 
 
 def test_clean_removes_what_was_made_here_and_is_not_used(checkout: Checkout) -> None:
