@@ -16,6 +16,7 @@ from string import Formatter
 from types import ModuleType
 
 from drive_can_bridge.cli.command import complain, FAILED, print_json, say
+from drive_can_bridge.cli.explained_words import KEYS, rows_of_word, VERDICTS
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.codes import CODES, MODULES
 from drive_can_bridge.core.messages import Text
@@ -26,12 +27,17 @@ PAGE = Path('docs', 'messages.md')
 _NEAREST = 5
 #: letters that are enough to look for
 _ENOUGH = 6
+#: letters that are enough where a text is all that stands behind a name
+_ENOUGH_OF_ALL = 4
+#: what ends a name before a text
+_BEFORE = re.compile(r'(?<=\S): ')
 #: put before the codes of files in the anchors of the page, where a code is of both
 _OF_FILES = 'file-'
 #: what the codes of a part of the catalogue stand for, behind the code
 _WHERE = {'drives and buses': 'said about a drive or a bus', 'commands': 'said by a command',
           'states': 'a state of a drive',
-          'files': 'said about a parameter file or a profile'}
+          'files': 'said about a parameter file or a profile', 'keys': 'a key of diagnostics',
+          'verdicts': 'stands before a reason', 'numbers': 'a number of the drive'}
 _HEADING = re.compile(r'# -- (.*?)(?: -+)?')
 #: where a clause of a row ends; not the comma that joins the names of a field
 _CLAUSE = re.compile(r'[,;] (?!\})')
@@ -94,7 +100,7 @@ def run(args: Namespace) -> int:
             say(f'{row.code} ({_WHERE[about]})')
             for form in forms(row):
                 say(f'  it says:    {form}')
-            say(f'  what to do: {row.do}')
+            say(f'  {"it is:     " if about in ("keys", "numbers") else "what to do:"} {row.do}')
     if rows[len(shown):]:
         complain(f'and {len(rows) - len(shown)} more: give more words')
     missing = unknown if rows else [text]
@@ -117,7 +123,10 @@ def _told(text: str) -> list[tuple[str, Text]]:
 def _named(text: str) -> list[tuple[str, Text]]:
     """Return the rows of codes, one after the other; none where a word is no code."""
     found: dict[tuple[str, str], tuple[str, Text]] = {}
-    for word in text.split():
+    words = text.split()
+    if len(words) == 1 and not _rows_of_code(text):
+        return list(rows_of_word(text.strip().strip('`')).items())
+    for word in words:
         of_word = _rows_of_code(word)
         if not of_word:
             return []
@@ -134,11 +143,11 @@ def _rows_of_code(word: str) -> dict[tuple[str, str], tuple[str, Text]]:
 
 
 def _codes() -> list[str]:
-    return sorted({code for rows in CODES.values() for code in rows})
+    return sorted({*KEYS, *VERDICTS, *(code for rows in CODES.values() for code in rows)})
 
 
 def _rows() -> Iterator[tuple[str, Text]]:
-    for about, rows in CODES.items():
+    for about, rows in (*CODES.items(), ('verdicts', VERDICTS)):
         for row in rows.values():
             if row is not sentences.uncoded:
                 yield about, row
@@ -156,13 +165,37 @@ def _with_words(text: str) -> list[tuple[str, Text]]:
 
 def _said_in(text: str) -> list[tuple[str, Text]]:
     """Return the rows that a line may be made of: those that have most in common with it first."""
-    fitting = [(places, about, row) for about, row in _rows()
-               if (places := row.places(text) or _begun(row, text))]
-    found = [(about, row) for places, about, row in sorted(
-        fitting, key=lambda each: (-len(each[0]), not each[2].places(text, whole=True)))
-             if not any(places < others for others, *_ in fitting)]
+    fitting = [(max(rest, places, key=len), len(rest) + _in_fields(rest, text), about, row)
+               for about, row in _rows() for rest in (_rest(row, text),)
+               if (places := row.places(text) or _begun(row, text)) or rest]
+    found = [(about, row) for places, covered, about, row in sorted(
+        fitting, key=lambda each: (-max(len(each[0]), each[1]),
+                                   not each[3].places(text, whole=True), -len(each[0])))
+             if about == 'verdicts' or not any(places < others for others, *_ in fitting)]
     # one word and fields fit nearly every line that has the word
     return [each for each in found if not _is_faint(each[1])] or found
+
+
+def _rest(row: Text, text: str) -> frozenset[int]:
+    """Return where the letters of a row stand that is all of a line behind names of its places."""
+    if not any(_first_words(form) in text for form in row.texts) or _is_faint(row):
+        return frozenset()
+    for begin in (0, *(found.end() for found in _BEFORE.finditer(text))):
+        places = row.places(text[begin:], whole=True, enough=_ENOUGH_OF_ALL)
+        if places:
+            return frozenset(begin + place for place in places)
+    return frozenset()
+
+
+def _first_words(form: str) -> str:
+    """Return what stands before the first field of a form, or between its first two."""
+    pieces = [before for before, *_ in Formatter().parse(form) if before.strip()]
+    return pieces[0] if pieces else form
+
+
+def _in_fields(places: frozenset[int], text: str) -> int:
+    """Return how many letters stand between those of a row that is the rest of a line."""
+    return sum(map(str.isalpha, text[min(places):])) - len(places) if places else 0
 
 
 def _begun(row: Text, text: str) -> frozenset[int]:
@@ -173,8 +206,9 @@ def _begun(row: Text, text: str) -> frozenset[int]:
 
 
 def _is_faint(row: Text) -> bool:
-    return all('<' in form and len(re.findall(r'[^\W\d_]+', re.sub('<.*?>', '', form))) < 2
-               for form in forms(row))
+    return row.code not in VERDICTS and all(
+        '<' in form and len(re.findall(r'[^\W\d_]+', re.sub('<.*?>', '', form))) < 2
+        for form in forms(row))
 
 
 def forms(row: Text) -> list[str]:

@@ -144,13 +144,14 @@ class Text:
                 return Sentence(variant.write(fields), self.code, fields, variant.kind, self)
         return Sentence(last.write(fields), self.code, fields, last.kind, self)
 
-    def places(self, text: str, *, whole: bool = False) -> frozenset[int]:
+    def places(self, text: str, *, whole: bool = False, enough: int = _ENOUGH) -> frozenset[int]:
         """
         Return where the letters of this row stand in a text; empty: the text is not from this row.
 
         :param whole: nothing else is to stand there.
+        :param enough: so many letters does a form need to count.
         """
-        return max((_places(each, text, whole) for each in self.texts), key=len)
+        return max((_places(each, text, whole, enough) for each in self.texts), key=len)
 
 
 def code_of(text: str, rows: Iterable[Text]) -> str:
@@ -160,10 +161,10 @@ def code_of(text: str, rows: Iterable[Text]) -> str:
     return code if best > next_best else ''
 
 
-def _places(form: str, text: str, whole: bool) -> frozenset[int]:
+def _places(form: str, text: str, whole: bool, enough: int) -> frozenset[int]:
     pieces = list(Formatter().parse(form))
     letters = sum(each.isalpha() for before, *_ in pieces for each in before)
-    if letters < (1 if whole and len(pieces) == 1 and pieces[0][1] is None else _ENOUGH) or (
+    if letters < (1 if whole and len(pieces) == 1 and pieces[0][1] is None else enough) or (
             not all(before in text for before, *_ in pieces)):      # the rest takes longer
         return frozenset()
     # what stands between two fields, each of which may be anything

@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from drive_can_bridge.cli import explain
+from drive_can_bridge.cli import explain, explained_words
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.core import complaints, sentences
 from drive_can_bridge.core.codes import code_of, CODES
@@ -106,6 +106,27 @@ def test_a_state_that_services_answer_with(
     assert 'motor' in first['do'] and code_of(state.value) == ''
 
 
+@pytest.mark.parametrize(('word', 'about', 'wanted'), [
+    ('2220h', 'numbers', 'manual'), ('0x0250', 'numbers', 'manual'),
+    ('command_age_s', 'keys', 'nan: none'), ('missed_exchanges', 'keys', 'not answer')])
+def test_words_of_messages_and_diagnostics(word: str, about: str, wanted: str,
+                                           capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['explain', '--json', word]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said['code'], said['about']) == (word, about) and wanted in said['do']
+    assert main(['explain', word]) == 0
+    assert '  it is:      ' in capsys.readouterr().out
+
+
+def test_every_key_of_diagnostics_is_explained() -> None:
+    """Those that docs/ros_interface.md lists."""
+    page = (Path(__file__).parents[2] / 'docs/ros_interface.md').read_text(encoding='utf-8')
+    table = page.partition('## Diagnostics')[2].partition('\n## ')[0]
+    keys = {key for line in table.splitlines() if line.startswith('| `')
+            for key in re.findall('`(.*?)`', line.split(' | ')[0])}
+    assert keys == set(explained_words.KEYS)
+
+
 def test_whom_a_text_is_about(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(['explain', 'file-read_only']) == 0
     assert capsys.readouterr().out.startswith(
@@ -125,15 +146,25 @@ def test_one_with_several_forms(capsys: pytest.CaptureFixture[str]) -> None:
     ('conveyor: read ramp_time (P30): no answer in 0.1 s, 3 attempts', ['no_answer']),
     ('lift: told to stop, but it does not answer: it may still be running',
      ['stop_not_answered', 'may_still_be_running']),
-    ('axis: offline: no complete set of PDOs for 3 cycles', ['silent_for_cycles']),
+    ('axis: offline: no complete set of PDOs for 3 cycles',
+     ['drive_went_offline', 'silent_for_cycles']),
     ('hoist, turn offline', ['members_offline']),
     ('no answer in 0.1 s', ['no_answer_to_stop', 'no_answer']),
     ('drives missing: 12 of 15 drives online; not seen: a, b', ['drives_missing']),
+    ('lift: fault (status word 0008h)', ['fault_came', 'status_word']),
+    ('fault (status word 0008h)', ['fault_came', 'status_word']),
+    ('lift: NOT STOPPED: drive offline', ['not_stopped', 'drive_offline']),
     ('a.yaml:9: drives.a.period: 0.001 s is too fast, allowed is at least 0.01 s unless '
      'allow_fast_cycle is true', ['period_too_fast'])])
 def test_a_line_of_a_log(line: str, wanted: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(['explain', '--json', line]) == 0
     assert [json.loads(each)['code'] for each in capsys.readouterr().out.splitlines()] == wanted
+
+
+@pytest.mark.parametrize('name', ['', 'axis: '])
+def test_what_stands_before_a_reason(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    found = codes(f'{name}offline: no answer to process data for 3 cycles', capsys=capsys)
+    assert found[:2] == [('drive_went_offline', 'verdicts'), ('silent_for_cycles', DRIVES)]
 
 
 def test_words_of_a_text(capsys: pytest.CaptureFixture[str]) -> None:
