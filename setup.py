@@ -4,15 +4,67 @@ Build script of the ROS 2 package (ament_python), usable with plain pip too.
 
 All meta data stands here, because colcon reads it from here. ``setup.cfg`` only tells where
 ``ros2 run`` looks for executables.
+
+With DRIVE_CAN_COMPILED=1 in the environment what is installed has a library beside each module of
+:data:`COMPILED`, which Python takes instead of it (docs/performance.md). Compiled by mypyc, all of
+them or none, and never into a checkout.
 """
 
+from importlib.machinery import EXTENSION_SUFFIXES
+import os
 from pathlib import Path
 import re
+import shutil
+import sys
+import sysconfig
+from tempfile import TemporaryDirectory
 
-from setuptools import find_packages, setup
+from setuptools import Extension, find_packages, setup
+from setuptools.command.build_ext import build_ext
+from setuptools.command.install_lib import install_lib
+from setuptools.errors import BaseError, SetupError
 
 PACKAGE = 'drive_can_bridge'
 HERE = Path(__file__).parent
+#: the one builder that it is tried with
+BUILDER = 'mypy==2.4.1'
+#: whether an environment is made for this build, with what it asks for
+BY_PIP = 'setuptools.build_meta' in sys.modules
+#: what each frame or cycle runs through; the rest is not worth it, and stays Python
+COMPILED = {
+    'core/command_interlock': 'each cycle and sample: whether commands reach the drive',
+    'core/control_machine': 'each cycle: the control word; each status word',
+    'core/drive_services': 'each command and request',
+    'core/fault_watch': 'each sample: whether the drive has a fault',
+    'core/frame': 'what all of them hand on',
+    'core/holding': 'each command: a setpoint',
+    'core/neutral_stop': 'each answer: whether a stop waits for it',
+    'core/outbox': 'each frame that is sent',
+    'core/process_image': 'each cycle: what was sent last',
+    'core/reporter': 'each sample: the list of events',
+    'core/session': 'each frame and each time that something is due',
+    'core/setpoints': 'each cycle: expiry; each command',
+    'core/statistics': 'two samples in each exchange',
+    'core/stop_duty': 'each frame that is sent, each answer',
+    'exchange/exchange': 'the threads of a bus: each frame, each pass',
+    'exchange/member': 'each frame and each timer: sending and telling',
+    'protocols/answers': 'each answer to a cycle',
+    'protocols/channel': 'each pass: whether a request is due',
+    'protocols/cyclic_exchange': 'each cycle',
+    'protocols/datamodel/extended_session': 'the family with the most drives on a bus',
+    'protocols/datamodel/process_words': 'each of its telegrams',
+    'protocols/exchange_book': 'each cycle and each answer: when the next is due',
+    'protocols/life': 'each pass: whether the script of a drive is due',
+    'ros/commands': 'each command',
+    'ros/drive_node': 'each sample and each command',
+    'ros/polled_topics': 'each cycle: what waits on command topics',
+    'ros/prepared': 'each message that is published as bytes',
+    'ros/samples': 'each sample',
+    'ros/stamps': 'the stamp of each sample',
+    'transport/end_point': 'what a port is made of',
+    'transport/link': 'each frame that is received or sent',
+    'transport/port': 'likewise',
+}
 
 
 def version() -> str:
@@ -43,6 +95,88 @@ def wheels(rclpy: str, messages: str) -> list[str]:
         f'ros-std-srvs=={messages}']
 
 
+def wants_compiled() -> bool:
+    """Return whether the environment asks for compiled modules."""
+    return os.environ.get('DRIVE_CAN_COMPILED', '') not in ('', '0')
+
+
+def go_on(problem: str) -> SetupError:
+    """Return the error of a build that was asked to compile and cannot: nothing is installed."""
+    return SetupError(f'{problem}. Without DRIVE_CAN_COMPILED in the environment it installs as '
+                      'pure Python, which does the same and takes more of the processor')
+
+
+def check_tools(compiler: str) -> None:
+    """See whether there is what compiles, before anything is made."""
+    try:
+        from importlib.metadata import version as installed
+        found = f'mypy=={installed("mypy")}'
+    except ImportError:     # PackageNotFoundError is one
+        found = 'none is installed'
+    if found != BUILDER:
+        raise go_on(f'DRIVE_CAN_COMPILED is set, and needs {BUILDER} ({found}): '
+                    f'{sys.executable} -m pip install {BUILDER}')
+    if shutil.which(compiler) is None:
+        raise go_on(f'DRIVE_CAN_COMPILED is set, and needs a C compiler, "{compiler}" '
+                    '(Debian, Ubuntu: apt install gcc)')
+    if not Path(sysconfig.get_path('include'), 'Python.h').is_file():
+        raise go_on(f'DRIVE_CAN_COMPILED is set, and needs the headers of {sys.executable} '
+                    '(Debian, Ubuntu: apt install python3-dev)')
+
+
+class CompileModules(build_ext):
+    """Compile what :data:`COMPILED` names; all of it, or nothing is installed."""
+
+    def run(self) -> None:
+        """Make C of the modules in a folder of its own, and libraries of that."""
+        if self.inplace or getattr(self, 'editable_mode', False):
+            raise go_on(
+                'DRIVE_CAN_COMPILED is set for an installation that follows this checkout (pip '
+                'install -e, colcon build --symlink-install): libraries would stay as they are '
+                'beside sources that change. Install without that')
+        check_tools((sysconfig.get_config_var('CC') or 'cc').split()[0])
+        # of a build before, when other modules were compiled
+        remove_libraries(Path(self.build_lib))
+        with TemporaryDirectory() as folder:
+            try:
+                self.distribution.ext_modules = compiled_modules(folder)
+                self.distribution.reinitialize_command(self)
+                self.ensure_finalized()
+                super().run()
+            except (BaseError, SystemExit) as error:
+                remove_libraries(Path(self.build_lib))
+                raise go_on(f'could not compile: {error}') from error
+
+
+def compiled_modules(folder: str) -> list[Extension]:
+    """Return what is to be built; its sources are in ``folder``."""
+    from mypyc.build import mypycify
+    return list(mypycify(
+        [
+            # no settings, and no package that is here by chance: the same code everywhere
+            '--config-file=', '--no-site-packages', '--ignore-missing-imports',
+            f'--cache-dir={folder}/cache',
+            *(f'{PACKAGE}/{module}.py' for module in COMPILED),
+        ],
+        target_dir=folder, group_name=PACKAGE, opt_level='2', debug_level='0'))
+
+
+def remove_libraries(folder: Path) -> None:
+    """Remove all compiled modules below a folder into which something is installed."""
+    for suffix in EXTENSION_SUFFIXES:
+        for library in (folder / PACKAGE).rglob(f'*{suffix}'):
+            library.unlink()
+
+
+class InstallLibrary(install_lib):
+    """Install; no library of before may be left beside a source that has changed."""
+
+    def install(self) -> 'list[str]':
+        """Copy what was built."""
+        remove_libraries(Path(self.install_dir))
+        return list(super().install() or ())
+
+
 setup(
     name=PACKAGE,
     version=version(),
@@ -68,6 +202,11 @@ setup(
         *shared_tree('launch'),
     ],
     zip_safe=False,
+    # it only says that there will be some, and so that the wheel is of this machine
+    ext_modules=[Extension(f'{PACKAGE}.compiled', [])] if wants_compiled() else [],
+    cmdclass={'build_ext': CompileModules, 'install_lib': InstallLibrary},
+    # pip has it for the time of the build; colcon has what is installed
+    setup_requires=[BUILDER] if wants_compiled() and BY_PIP else [],
     python_requires='>=3.10',
     # rclpy is missing here on purpose: rosdep brings it, and drive_can works without it.
     install_requires=[
@@ -99,7 +238,7 @@ setup(
             'durand==0.5.0',
             'hypothesis',
             'matplotlib',
-            'mypy',
+            BUILDER,
             'pytest',
             'pytest-timeout',
             'scapy>=2.5',

@@ -5,10 +5,12 @@ import ast
 import importlib.metadata
 import importlib.util
 import json
+import os
 from pathlib import Path
 import re
 import runpy
 import shlex
+import shutil
 import subprocess
 import sys
 from types import ModuleType
@@ -17,9 +19,10 @@ from unittest import mock
 from xml.etree import ElementTree
 
 import pytest
+from setuptools import Distribution
 
 import drive_can_bridge
-from drive_can_bridge import resources
+from drive_can_bridge import compiled, resources
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 PACKAGE = CHECKOUT / 'drive_can_bridge'
@@ -288,3 +291,69 @@ def test_an_unknown_file_is_answered_with_the_known_ones(
     monkeypatch.setattr(resources, 'share_directory', lambda: tmp_path)
     with pytest.raises(FileNotFoundError, match=r'no other\.yaml in .*, which has: known\.yaml'):
         resources.config_file('other.yaml')
+
+
+# -- the compiled build ---------------------------------------------------------------------------
+
+
+@pytest.fixture
+def script() -> dict[str, Any]:
+    """Return the names of setup.py."""
+    with mock.patch('setuptools.setup'):
+        return runpy.run_path(str(CHECKOUT / 'setup.py'))
+
+
+def test_what_may_be_compiled_is_there_once_each_with_a_reason(script: dict[str, Any]) -> None:
+    for module, why in script['COMPILED'].items():
+        assert (PACKAGE / f'{module}.py').is_file() and why
+
+
+def test_nothing_is_compiled_unless_asked_for(
+        monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
+    monkeypatch.delenv('DRIVE_CAN_COMPILED', raising=False)
+    arguments = request.getfixturevalue('arguments')
+    assert arguments['ext_modules'] == arguments['setup_requires'] == []
+    assert not any('mypy' in each for each in arguments['install_requires'])
+
+
+def test_no_library_stands_beside_sources_that_may_change() -> None:
+    """Python would take it instead of them."""
+    assert compiled.build() == 'pure Python'
+    assert not [path for path in files_below(PACKAGE) if path.suffix == '.so']
+
+
+@pytest.mark.parametrize(('words', 'told'), [
+    (('build_ext', '--inplace'), 'beside sources that change'),
+    (('develop', '--no-deps', '--install-dir', 'bin'), 'beside sources that change'),
+    (('build', '--build-base', 'built'), 'needs mypy=='),
+    (('install', '--prefix', 'there', '--record', 'record'), 'needs mypy=='),
+])
+def test_a_build_that_cannot_be_compiled_says_how_to_go_on_and_installs_nothing(
+        words: tuple[str, ...], told: str, tmp_path: Path, programs: None) -> None:
+    checkout = tmp_path / 'checkout'
+    shutil.copytree(CHECKOUT, checkout, ignore=shutil.ignore_patterns(
+        '.*', '*.egg-info', '__pycache__', 'test', 'bench', 'docs', 'findings', 'build', 'view'))
+    (tmp_path / 'mypy-0.0.1.dist-info').mkdir()
+    (tmp_path / 'mypy-0.0.1.dist-info' / 'METADATA').write_text('Name: mypy\nVersion: 0.0.1\n')
+    done = subprocess.run(
+        [sys.executable, 'setup.py', *words], cwd=checkout, text=True, capture_output=True,
+        env={**os.environ, 'DRIVE_CAN_COMPILED': '1', 'PYTHONPATH': str(tmp_path)}, check=False)
+    assert done.returncode != 0
+    last = done.stderr.strip().splitlines()[-1]
+    assert told in last and 'Without DRIVE_CAN_COMPILED' in last
+    assert 'Traceback' not in done.stderr
+    assert not [path for path in tmp_path.rglob('*') if path.suffix in ('.so', '.egg-link')]
+    assert not [path for path in (checkout / 'there').rglob('*') if path.is_file()]
+
+
+def test_no_library_of_before_is_left_beside_what_is_installed(
+        script: dict[str, Any], tmp_path: Path) -> None:
+    suffix = script['EXTENSION_SUFFIXES'][0]
+    folder = tmp_path / PACKAGE.name / 'core'
+    folder.mkdir(parents=True)
+    for name in (f'session{suffix}', 'session.py'):
+        (folder / name).touch()
+    command = script['InstallLibrary'](Distribution())
+    command.build_dir, command.install_dir = str(tmp_path / 'nothing'), str(tmp_path)
+    command.install()
+    assert [path.name for path in folder.iterdir()] == ['session.py']
