@@ -511,3 +511,79 @@ def test_what_heirs_that_stay_python_may_change_is_a_class_variable() -> None:
                         line.targets[0]) == '__slots__', (path, node.name, ast.unparse(line))
                     assert not isinstance(line, ast.AnnAssign) or line.value is None or (
                         'ClassVar' in ast.unparse(line.annotation)), (path, ast.unparse(line))
+
+
+def _compiled_sources() -> set[Path]:
+    """Return what setup.py compiles."""
+    for node in nodes_of(CHECKOUT / 'setup.py'):
+        if isinstance(node, ast.AnnAssign | ast.Assign) and ast.unparse(node).startswith('COMPILED'):
+            assert node.value is not None
+            return {PACKAGE / f'{module}.py' for module in ast.literal_eval(node.value)}
+    raise AssertionError('setup.py has no COMPILED')
+
+
+def _own_names(node: ast.ClassDef) -> tuple[set[str], set[str]]:
+    """Return what a class gives values in its body, and what each of its objects has by its place."""
+    body, places = set(), set()
+    for line in node.body:
+        if isinstance(line, ast.FunctionDef):
+            body.add(line.name)
+        for target in line.targets if isinstance(line, ast.Assign) else ():
+            body.add(ast.unparse(target))
+        if isinstance(line, ast.AnnAssign) and 'ClassVar' not in ast.unparse(line.annotation):
+            places.add(ast.unparse(line.target))
+        if isinstance(line, ast.AnnAssign) and line.value is not None:
+            body.add(ast.unparse(line.target))
+    for each in ast.walk(node):
+        if (isinstance(each, ast.Attribute) and isinstance(each.ctx, ast.Store)
+                and ast.unparse(each.value) == 'self'):
+            places.add(each.attr)
+    return body - {'__slots__'}, places
+
+
+def test_no_heir_that_stays_python_replaces_what_compiled_code_finds_by_its_place() -> None:
+    """
+    Nobody would say so: compiled code would go on with its own.
+
+    Methods, properties and class variables of a class that allows such heirs are looked up.
+    """
+    compiled = _compiled_sources()
+    classes = {node.name: (path, node) for path in SOURCES for node in nodes_of(path)
+               if isinstance(node, ast.ClassDef)}
+
+    def ancestors(name: str) -> Iterator[str]:
+        for base in classes[name][1].bases:
+            above = ast.unparse(base).split('[')[0].split('.')[-1]
+            if above in classes:
+                yield above
+                yield from ancestors(above)
+    heirs = 0
+    for name, (path, node) in classes.items():
+        body, places = _own_names(node)
+        for above in ancestors(name) if path not in compiled else ():
+            whose, ancestor = classes[above]
+            words = {ast.unparse(base) for base in ancestor.bases}
+            if whose not in compiled or words & {'Enum', 'IntEnum', 'NamedTuple'}:
+                continue
+            heirs += 1
+            assert any('allow_interpreted_subclasses=True' in ast.unparse(each)
+                       for each in ancestor.decorator_list), (name, above)
+            defined, kept = _own_names(ancestor)
+            # a property is set by its name, too
+            methods = {line.name for line in ancestor.body if isinstance(line, ast.FunctionDef)}
+            assert not body & (kept - methods), (path, name, above)
+            assert not places & methods, (path, name, above)
+    assert heirs > 5
+
+
+def test_no_compiled_code_asks_whether_a_number_that_may_be_a_flag_is_one() -> None:
+    """``bool | int`` is an ``int`` there, and no number is True or False: not even a True."""
+    either = {node.target.id for path in SOURCES for node in nodes_of(path)
+              if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)
+              and set(ast.unparse(node.annotation).split(' | ')) == {'bool', 'int'}}
+    assert 'continuous' in either
+    for path in _compiled_sources():
+        for node in nodes_of(path):
+            if isinstance(node, ast.Compare) and isinstance(node.ops[0], ast.Is | ast.IsNot):
+                asked = node.left.attr if isinstance(node.left, ast.Attribute) else ''
+                assert asked not in either, (path, ast.unparse(node))

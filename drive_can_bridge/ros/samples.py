@@ -209,7 +209,7 @@ class SamplePublisher:
             EventTopic(node, '~/response', mapped, len(parameters) - len(mapped))]
         joint = self._joint = drive.joint
         self._continuous = (ContinuousPosition(joint, parameters)
-                            if joint is not None and joint.continuous is not False else None)
+                            if joint is not None and joint.continuous else None)
         if joint is not None and (joint.position or joint.velocity or joint.effort):
             self._samples.append(JointTopic(node, joint, parameters))
         self._bits = [BitTopics(node, parameter, slot)
