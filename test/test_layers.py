@@ -516,14 +516,13 @@ def test_what_heirs_that_stay_python_may_change_is_a_class_variable() -> None:
 def _compiled_sources() -> set[Path]:
     """Return what setup.py compiles."""
     for node in nodes_of(CHECKOUT / 'setup.py'):
-        if isinstance(node, ast.AnnAssign | ast.Assign) and ast.unparse(node).startswith('COMPILED'):
-            assert node.value is not None
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == 'COMPILED':
             return {PACKAGE / f'{module}.py' for module in ast.literal_eval(node.value)}
     raise AssertionError('setup.py has no COMPILED')
 
 
 def _own_names(node: ast.ClassDef) -> tuple[set[str], set[str]]:
-    """Return what a class gives values in its body, and what each of its objects has by its place."""
+    """Return what the body of a class gives values, and what each object has by its place."""
     body, places = set(), set()
     for line in node.body:
         if isinstance(line, ast.FunctionDef):

@@ -278,7 +278,10 @@ class BridgeNode(LifecycleNode):
                             *arguments: Any, **options: Any) -> Subscription:
         """Create a subscription; that of the simulated clock is made by rclpy itself."""
         if topic == CLOCK_TOPIC:
-            callback = self._stamps.guarded(callback)
+            guarded = self._stamps.guarded(callback)
+            # rclpy asks for the signature of a callback; one that is compiled has none
+            return super().create_subscription(
+                msg_type, topic, lambda message: guarded(message), *arguments, **options)
         return super().create_subscription(msg_type, topic, callback, *arguments, **options)
 
     # -- parameters -------------------------------------------------------------------------------

@@ -212,6 +212,7 @@ def test_commands_for_all_of_them(bridge: StartBridge, client: Client) -> None:
     assert speeds(one)['north'] == 1000
 
 
+@pytest.mark.interpreted    # replaces a method
 def test_a_defect_of_one_drive_costs_no_other(bridge: StartBridge, client: Client,
                                               monkeypatch: pytest.MonkeyPatch) -> None:
     """Whichever drive of a bus has its turn takes the message, for all of them."""
@@ -236,6 +237,7 @@ def test_a_defect_of_one_drive_costs_no_other(bridge: StartBridge, client: Clien
     one.online()
 
 
+@pytest.mark.interpreted    # replaces a method
 def test_a_drive_that_begins_anew_behind_a_defect_costs_no_other_its_command(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     one = bridge(two())

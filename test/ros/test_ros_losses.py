@@ -59,6 +59,7 @@ def test_a_drive_whose_bus_hangs_is_not_online_until_that_is_over(
     assert topic.values[-1]
 
 
+@pytest.mark.interpreted    # replaces a method
 def test_a_look_that_came_too_late_is_put_right_by_the_next(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever waited in vain for the lock of a bus tells so when the bus may be back."""

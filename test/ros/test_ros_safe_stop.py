@@ -126,10 +126,11 @@ def test_a_dead_timer_thread_ends_the_bridge_safely(bridge: StartBridge, client:
     with one.record() as recorder:
         monkeypatch.setattr(exchange._wake, 'wait', fail)
         exchange._wake.ring()
-        wait_until(lambda: not exchange._thread.is_alive())
+        wait_until(lambda: not exchange._timer_thread.is_alive())
         ends_safely(one, client, recorder)
 
 
+@pytest.mark.interpreted    # replaces a method
 def test_a_dead_reader_ends_the_bridge_safely(bridge: StartBridge, client: Client,
                                               monkeypatch: pytest.MonkeyPatch) -> None:
     one = run(bridge, client)
@@ -141,7 +142,7 @@ def test_a_dead_reader_ends_the_bridge_safely(bridge: StartBridge, client: Clien
     with one.record() as recorder:
         monkeypatch.setattr(BusExchange, '_serve', fail)
         wait_until(lambda: one.fatal)
-        assert one.node.exchanges['main']._thread.is_alive()
+        assert one.node.exchanges['main']._timer_thread.is_alive()
         ends_safely(one, client, recorder)
 
 
@@ -196,6 +197,7 @@ def test_stopping_twice_is_harmless(bridge: StartBridge, client: Client) -> None
 
 @pytest.mark.parametrize('taken', [False, True])
 @pytest.mark.parametrize('service', ['set_parameters', 'quick_stop'])
+@pytest.mark.interpreted    # replaces a method
 def test_who_asks_for_what_meets_a_defect_is_answered_once(
         bridge: StartBridge, client: Client, service: str, taken: bool,
         monkeypatch: pytest.MonkeyPatch) -> None:
