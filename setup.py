@@ -162,9 +162,11 @@ def compiled_modules(folder: str) -> list[Extension]:
 
 
 def remove_libraries(folder: Path) -> None:
-    """Remove all compiled modules below a folder into which something is installed."""
+    """Remove all compiled modules in a folder into which something is installed."""
     for suffix in EXTENSION_SUFFIXES:
-        for library in (folder / PACKAGE).rglob(f'*{suffix}'):
+        # what all of them consist of stands beside the package
+        for library in [*(folder / PACKAGE).rglob(f'*{suffix}'),
+                        *folder.glob(f'{PACKAGE}__mypyc*{suffix}')]:
             library.unlink()
 
 

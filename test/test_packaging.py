@@ -353,7 +353,10 @@ def test_no_library_of_before_is_left_beside_what_is_installed(
     folder.mkdir(parents=True)
     for name in (f'session{suffix}', 'session.py'):
         (folder / name).touch()
+    for name in (f'{PACKAGE.name}__mypyc{suffix}', f'other{suffix}'):
+        (tmp_path / name).touch()
     command = script['InstallLibrary'](Distribution())
     command.build_dir, command.install_dir = str(tmp_path / 'nothing'), str(tmp_path)
     command.install()
     assert [path.name for path in folder.iterdir()] == ['session.py']
+    assert {path.name for path in tmp_path.iterdir()} == {PACKAGE.name, f'other{suffix}'}
