@@ -19,6 +19,7 @@ from drive_can_bridge.client.drive import Drive, Drives, DriveSource, ReadOutcom
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
+from drive_can_bridge.core.text import nearest
 from drive_can_bridge.resources import what_is_missing
 
 
@@ -102,6 +103,11 @@ def matching(names: Sequence[str], word: str) -> list[str]:
     return [name for name in names if fnmatchcase(name, word)]
 
 
+def _near(word: str, names: Sequence[str]) -> str:
+    meant = nearest(word, names)
+    return f' (did you mean {meant!r}?)' if meant else ''
+
+
 def split_words(names: Sequence[str], words: Sequence[str]) -> tuple[list[str], list[str]]:
     """
     Separate the drive from the rest of the words: the first one, if it matches a drive.
@@ -111,7 +117,7 @@ def split_words(names: Sequence[str], words: Sequence[str]) -> tuple[list[str], 
     if words and matching(names, words[0]):
         return matching(names, words[0]), list(words[1:])
     if len(names) != 1:
-        said = f'{words[0]!r} is none. ' if words else ''
+        said = f'{words[0]!r} is none{_near(words[0], names)}. ' if words else ''
         raise WrongUsage(command_sentences.which_drive(
             said=said, there=', '.join(names) or 'none'))
     return list(names), list(words)

@@ -206,7 +206,7 @@ def _begun(row: Text, text: str) -> frozenset[int]:
 
 
 def _is_faint(row: Text) -> bool:
-    return row.code not in VERDICTS and all(
+    return row not in VERDICTS.values() and all(
         '<' in form and len(re.findall(r'[^\W\d_]+', re.sub('<.*?>', '', form))) < 2
         for form in forms(row))
 

@@ -24,7 +24,9 @@ from drive_can_bridge.resources import what_is_missing
 STOP = 'stop'
 _WORDS = {
     STOP: ('[DRIVE …]', '*', 'stop drives; without a name all drives of every bridge, at once',
-           'Calls ~/quick_stop of each drive, and asks nothing. Exit code 0: all have stopped. '
+           'Calls ~/quick_stop of each drive, and asks nothing. Without a name it stops those of '
+           'all bridges of this computer, whatever their ROS domain or user, and of other '
+           'computers in this domain; a name means this domain. Exit code 0: all have stopped. '
            '1: the lines at the top say who may still be running.'),
     'enable': ('DRIVE …', '+', 'enable drives', 'Calls ~/enable. Nothing moves: setpoints stay '
                                               'neutral until they are armed.'),

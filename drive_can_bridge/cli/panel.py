@@ -56,6 +56,11 @@ def run(args: argparse.Namespace) -> int:
         return code
 
 
+def _module(error: ImportError) -> str:
+    """Return which module to install: another one that is missing comes with NiceGUI."""
+    return 'nicegui' if error.name in (None, 'nicegui') else f'nicegui ({error.name})'
+
+
 def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
     """Serve until the end; return whether the addresses were printed before it came."""
     try:
@@ -72,7 +77,7 @@ def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
         from drive_can_bridge.panel.server import address, listen, serve
     except ImportError as error:
         raise DriveCanError(command_sentences.extra_missing(
-            command=COMMAND, module=error.name, how=command_that_brings('panel'))) from error
+            command=COMMAND, module=_module(error), how=command_that_brings('panel'))) from error
     if ended():
         return False
     listener = listen(args.host, args.port)

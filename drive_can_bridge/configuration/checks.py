@@ -85,6 +85,8 @@ def check_buses(tree: Tree, adapters: Adapters | None) -> dict[str, BusConfigura
         if missing:
             tree.wrong(path, complaints.adapter_needs(interface=entry['interface'], keys=missing))
         _check_keys(tree, path, entry, keywords)
+        if 'bitrate' not in entry and 'bitrate' in (keywords or ()):
+            tree.suspicious(path, complaints.bitrate_assumed(bitrate=values['bitrate']))
         _check_trace_directory(tree, path, values)
         if 'interface' not in entry or 'channel' not in entry:
             continue

@@ -21,7 +21,8 @@ class BusLoss(Enum):
 no_socketcan = Text(
     'this kernel has no SocketCAN: "modprobe can_raw" loads it where there is one (some '
     'containers and virtual machines have none)',
-    do='run sudo modprobe can_raw on the host; a container needs the network of the host')
+    do='run sudo modprobe can_raw on the host; a container needs the network of the host; '
+       'drive_can simulate --pty-link DIR needs no CAN')
 interface_renamed = Text(
     'interface {name} is called {other} now: write it as channel, or "ip link set {other} down", '
     '"ip link set {other} name {name}"',

@@ -251,6 +251,9 @@ no_serial_port = Text(
     '{channel!r} is no serial port, allowed are a device such as /dev/ttyACM0, '
     'socket://HOST:PORT and rfc2217://HOST:PORT',
     do='see drive_can adapters, and ls /dev/serial/by-id')
+bitrate_assumed = Text(
+    'bitrate is not given: {bitrate}',
+    do='write the bit rate of the drives: an adapter at another one disturbs the bus')
 no_bitrate = Text(
     '{bitrate} is impossible with {interface}, allowed is one of {allowed}',
     do='write one of the bit rates that are allowed, and set the drives to the same')

@@ -171,7 +171,7 @@ modes_offered = Text(
     '6502h is {offered:08X}h: none of those known here',
     do='choose one of these as mode')
 mapping_holds = Text(
-    '{place} holds {found} and not {wanted}',
+    '{place} is mapped to {found}; the file wants {wanted}',
     do='mapping: configure lets the bridge write it')
 mapping_fits = Text(
     'all PDOs are mapped as the file wants them; configure does no harm', do='nothing')

@@ -548,13 +548,18 @@ maps_unknown = Text(
 malformed = Text('{what}', do='see who else sends on this identifier')
 unasked = Text(
     '{what} that nobody asked for',
-    do='look for a second master, or a second station with the same number')
+    do='just after a loss it is a late answer: see what slows the computer or the adapter down; '
+       'else look for a second master, or a second station with the same number')
 nobody_asked = Text(
     '{frame}: nobody asked for it',
-    do='look for a second master, or a second station with the same number')
+    do='just after a loss it is a late answer: see what slows the computer or the adapter down; '
+       'else look for a second master, or a second station with the same number')
 of_somebody_else = Text('{frame}: of somebody else', do='see who sends on this identifier')
 not_of_this_drive = Text('{frame}: not of this drive', do='see who sends on this identifier')
-unasked_pkw = Text('PKW response that nobody asked for: {message}', do='look for a second master')
+unasked_pkw = Text(
+    'PKW response that nobody asked for: {message}',
+    do='just after a loss it is a late answer: see what slows the computer or the adapter down; '
+       'else look for a second master')
 short_process_data = Text(
     'process data with {found} values, {needed} needed',
     do='compare cyclic_response with the settings of the inverter')
@@ -885,8 +890,8 @@ answer_kept = Text(
     do='run that command, for good by a udev rule (docs/adapters.md), or choose a longer period')
 more_missed_would_hold = Text(
     'answered again {gap:.2g} s after its last answer: if the computer or the adapter is slow, '
-    'missed_limit: {limit} would have held (a drive that is gone is lost after {seconds:.2g} s '
-    'then)',
+    'missed_limit: {limit} would have bridged this gap; a drive that is really gone would then be '
+    'noticed after {seconds:.2g} s',
     do='raise missed_limit, or see what else the computer does')
 longer_period_would_hold = Text(
     'period: {period:g} would have held',

@@ -324,7 +324,8 @@ def help_lines(drive: DriveSnapshot | None, setting: ViewSetting, width: int) ->
             (f'drive_can write {name} NAME=VALUE', 'one of them, written and looked at again'),
             *([(f'drive_can enable {name}', 'or says what is missing')] if controlled else []),
             (f'drive_can jog {name} VALUE', 'a setpoint for 2 s, then neutral'),
-            ('drive_can stop', 'all drives of all bridges, at once')):
+            (f'drive_can stop {name}', 'this one'),
+            ('drive_can stop', 'all drives, in every ROS domain of this computer, at once')):
         lines += flow([Text(command, style='bold'), Text(what, style=DIM)], width, 2)
     lines += [Text(), Text('states', style=DIM)]
     for tone, what in ((Tone.OK, 'enabled and armed, or online'), (Tone.OFF, 'disabled'),

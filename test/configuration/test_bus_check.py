@@ -287,7 +287,8 @@ def test_serial_port_of_two_buses_that_is_not_plugged_in(tmp_path: Path) -> None
 def test_serial_ports_of_their_own(tmp_path: Path, terminal: str) -> None:
     text = with_serial_buses(terminal, 'slcan', '/dev/no_such_port')
     assert problems(tmp_path, text, adapters=adapters) == []
-    assert warnings(tmp_path, text, adapters=adapters) == []
+    assert warnings(tmp_path, text, adapters=adapters) == [
+        at('f.yaml:9: buses.other', 'bitrate_assumed', bitrate=125000)]
 
 
 def test_bus_with_the_name_of_another_channel(tmp_path: Path) -> None:

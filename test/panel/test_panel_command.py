@@ -33,7 +33,8 @@ def serve(*words: str, ended: Callable[[], bool] = lambda: False) -> bool:
 
 @pytest.mark.parametrize(('missing', 'by', 'words'), [
     ('rclpy', 'ros.monitor.client', 'needs ROS 2'),
-    ('nicegui', 'panel.pages', "-m pip install 'nicegui")])
+    ('nicegui', 'panel.pages', "-m pip install 'nicegui"),
+    ('starlette', 'panel.pages', 'module nicegui (starlette) is not installed: ')])
 def test_what_is_missing_is_said(missing: str, by: str, words: str,
                                  monkeypatch: pytest.MonkeyPatch) -> None:
     class Incomplete(ModuleType):
