@@ -69,7 +69,8 @@ def define(parser: argparse.ArgumentParser) -> None:
                         help='parameter file of a bridge, instead of the one of the demo; its '
                              'buses are replaced by pseudo-terminals')
     parser.add_argument('--drive', action='store_true',
-                        help='command the drives, too: arm, enable, then a slow sine')
+                        help='command the drives, too: arm, enable, then a slow sine; one '
+                             'that was stopped is enabled again after a moment')
     parser.add_argument('--fault', metavar='DRIVE:FAULT', action='append', default=[],
                         help='begin with a fault, for example lift:silent; repeatable')
     parser.add_argument('--log-frames', metavar='FILE', type=Path,

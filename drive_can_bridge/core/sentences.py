@@ -170,9 +170,9 @@ no_reset_word = Text(
     'no fault reset: the profile has no reset_fault word',
     do='reset it at the drive, or add reset_fault to the words of the control section')
 reset_first = Text(
-    'fault {fault}: remove its cause, then reset it first',
+    'fault {fault}: remove its cause, then reset it first (drive_can reset)',
     'fault: reset it first',
-    do='remove the cause of the fault, then call ~/reset_fault')
+    do='remove the cause of the fault, then drive_can reset, or call ~/reset_fault')
 fault_named = Text(
     'fault {number} {name}: remove its cause, then reset it',
     'fault {number}: remove its cause, then reset it',
@@ -222,8 +222,8 @@ stuck = Text(
     'no confirmation in {timeout:g} s: stuck in state {state} ({status})',
     do='see what keeps the drive in that state; raise control_timeout for long ramps')
 voltage_disabled = Text(
-    'voltage is disabled: look at the digital inputs with that function',
-    do='look at the digital inputs with that function')
+    'voltage is disabled: power is missing, or safe torque off or an enable input keeps it off',
+    do='look at the supply of the motor, at safe torque off (STO), and at the digital inputs')
 quick_stop_active = Text(
     'a quick stop is active: look at the digital inputs with that function',
     do='look at the digital inputs with that function')
