@@ -91,6 +91,11 @@ class _FileReader:
 
     def _names(self, node: YamlNode, path: Path) -> None:
         """Read a mapping above ``ros__parameters``: its keys are node names or namespaces."""
+        if path and _lacks_parameters(node):
+            first, _ = next(iter(node.pairs))
+            self._note(first.line, (PARAMETERS_KEY,), complaints.parameters_missing(
+                section='/'.join(path)))
+            return
         has_parameters = False
         for key, value in node.pairs:
             if key.kind is not NodeKind.SCALAR or not key.text:
@@ -137,6 +142,19 @@ class _FileReader:
         reader.read(node)
         self.sections.append(NodeSection(name, reader.tree, reader.refused, reader.twice))
         self.problems.extend(reader.refused)
+
+
+def _lacks_parameters(node: YamlNode) -> bool:
+    """Return whether our keys stand in a section where ``ros__parameters`` should be."""
+    return any(key.text in _OURS and not _has_parameters(value)
+               for key, value in node.pairs) and not _has_parameters(node)
+
+
+def _has_parameters(node: YamlNode) -> bool:
+    """Return whether ``ros__parameters``, or what is like it, is a key of a node."""
+    return node.kind is NodeKind.MAPPING and any(
+        nearest(key.text or '', [PARAMETERS_KEY], cutoff=_SLIP) is not None
+        for key, _ in node.pairs)
 
 
 def read_sections(path: FilePath) -> tuple[list[NodeSection], list[Problem]]:

@@ -160,6 +160,9 @@ file_is_for = Text(
     do='give the file of this bridge, or name its section /**/drive_can_bridge')
 no_mapping = Text('no mapping, allowed is NODE_NAME: {{{entry}: …}}')
 no_mapping_refused = Text('no mapping (rcl refuses the file), {hint}')
+parameters_missing = Text(
+    'is missing below {section}, allowed is a line of its own with the rest indented below it',
+    do='write ros__parameters: there, and indent what follows by two more spaces')
 without_head = Text(
     'stands at the beginning of the file, allowed is below /**/drive_can_bridge: and {entry}:, '
     'each indented by two more spaces',

@@ -82,6 +82,7 @@ def test_there_are_many_and_the_file_itself_is_good(
     (complaints.two_keys_in_line, 'two keys in one line'),
     (complaints.not_below, 'nothing is indented below the drive'),
     (complaints.without_head, 'without a head'),
+    (complaints.parameters_missing, 'without ros__parameters'),
     (complaints.two_protocols, 'protocol: canopen'),
     (complaints.to_be_imported, 'profile: an EDS file'),
     (complaints.some_allowed, 'cyclic_response: a name that is like none'),
