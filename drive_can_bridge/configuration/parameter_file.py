@@ -94,7 +94,7 @@ class _FileReader:
         if path and _lacks_parameters(node):
             first, _ = next(iter(node.pairs))
             self._note(first.line, (PARAMETERS_KEY,), complaints.parameters_missing(
-                section='/'.join(path)))
+                section='/'.join(map(str, path))))
             return
         has_parameters = False
         for key, value in node.pairs:
