@@ -71,6 +71,8 @@ class CycleAnswers:
             return True
         late = self.book.late(received_at)
         if late is not None or not self.book.take_stale():
+            if late is None:
+                self.book.too_many(received_at)
             self.session.report.unasked(
                 sentences.unasked(what), late, now, would_hold=self._would_hold)
         if self.slack.since < math.inf:

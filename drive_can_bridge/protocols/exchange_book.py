@@ -16,6 +16,10 @@ Some never come, and no answer says which. So cycles are given up after a while,
 has lost a few would never be seen to answer the last one; but not those from before a stop that
 nothing has shown yet. What a gateway has held may come all the same, all at once. That is seen by
 being more than one answer since the last cycle: these are to what was given up, as far as it goes.
+
+A drive that answers more often than it was asked (a gateway that doubles frames) spoils that
+count: each answer too many looks like one to the next cycle. For a while after one, only an answer
+shows a stop that comes when none to a running cycle can come any more.
 """
 
 from collections import deque
@@ -135,8 +139,8 @@ class ExchangeBook:
 
     __slots__ = (
         '_asked', '_came', '_given_up', '_heard_at', '_horizon', '_kept', '_limit', '_period',
-        '_runs', '_since', '_statistics', '_steady', 'answered_at', 'awaiting', 'began_at',
-        'missed_in_row', 'overdue', 'stale', 'stop_shown', 'timer')
+        '_ran_at', '_runs', '_since', '_statistics', '_steady', '_too_many_at', 'answered_at',
+        'awaiting', 'began_at', 'missed_in_row', 'overdue', 'stale', 'stop_shown', 'timer')
 
     def __init__(self, drive: DriveConfiguration, statistics: DriveStatistics,
                  timer: CycleTimer | None = None) -> None:
@@ -151,6 +155,8 @@ class ExchangeBook:
         self._came = 0              # answers since the last cycle
         self._steady = False        # the one before was answered once
         self._heard_at = -math.inf
+        self._ran_at = -math.inf        # the last running cycle was sent then
+        self._too_many_at = -math.inf   # an answer came that no cycle was left for
         self._period = drive.period
         self._horizon = max(HORIZON, HORIZON_PERIODS * drive.period)
         self._kept = self._horizon + max(STOP_MAX, drive.control_timeout)
@@ -184,6 +190,7 @@ class ExchangeBook:
         self.awaiting = True
         self.began_at = now
         if runs:
+            self._ran_at = now
             self.doubt()
         steady = self._came == 1
         if steady and self._steady:     # nothing is held
@@ -208,8 +215,18 @@ class ExchangeBook:
             at, neutral = of.popleft()
             self._came += 1
             self._heard_at = received_at
-            self.stop_shown = self.stop_shown or neutral == self._runs
+            self.stop_shown = self.stop_shown or (
+                neutral == self._runs and self._counts(received_at))
             self.overdue = max(0.0, received_at - at - self._period)
+
+    def _counts(self, received_at: float) -> bool:
+        """Return whether an answer is known to be to no running cycle, where the count says so."""
+        return (received_at - self._too_many_at > HELD_MAX
+                or received_at - self._ran_at > self._horizon)
+
+    def too_many(self, received_at: float) -> None:
+        """Record an answer that no cycle is left for."""
+        self._too_many_at = received_at
 
     def late(self, received_at: float) -> float | None:
         """
