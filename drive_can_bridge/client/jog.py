@@ -25,7 +25,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused, WhichBridge
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
-from drive_can_bridge.core.text import printable, value_text
+from drive_can_bridge.core.text import printable, UNNAMED_NODE, value_text
 from drive_can_bridge.ros.client.calls import NodeCalls
 from drive_can_bridge.ros.client.graph import Graph
 from drive_can_bridge.ros.client.search import find_drives
@@ -50,8 +50,6 @@ READY = ('online', 'not armed')
 
 _TYPES: dict[ValueKind, Any] = {
     ValueKind.DOUBLE: Float64, ValueKind.INTEGER: Int64, ValueKind.BOOL: Bool}
-#: of a publisher whose node has not been discovered yet
-_UNKNOWN_NODE = '_NODE_NAME_UNKNOWN_'
 
 
 class JogRefused(DriveCanError):
@@ -414,5 +412,5 @@ def _others(text: Any, own: str) -> Iterator[str]:
         return
     for each in publishers:
         node = each.partition(' ')[0]
-        if node != own and not node.endswith(_UNKNOWN_NODE):
+        if node != own and not node.endswith(UNNAMED_NODE):
             yield printable(each)

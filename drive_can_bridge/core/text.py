@@ -20,6 +20,8 @@ TEXT_MAX = 256
 _CUT = '…'
 #: of a value that a message shows
 _SHOWN_MAX = 40
+#: what ROS calls a node of which it knows a publisher, and not the name yet
+UNNAMED_NODE = '_NODE_NAME_UNKNOWN_'
 
 
 def printable(text: str, limit: int | None = TEXT_MAX) -> str:

@@ -24,7 +24,7 @@ from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import is_misplaced_integer, Value, ValueKind
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
-from drive_can_bridge.core.text import value_text
+from drive_can_bridge.core.text import UNNAMED_NODE, value_text
 from drive_can_bridge.ros.advice import how_to_enable
 from drive_can_bridge.ros.joint_reader import JointMessage, JointReader, QUANTITIES
 from drive_can_bridge.ros.polled_topics import PolledTopics, Warn
@@ -118,8 +118,9 @@ class CommandIntake:
         return sorted(f'{node} {topic}' for node, topic in self._publishers([joint_commands]))
 
     def commanding_nodes(self, joint_commands: Iterable[str]) -> list[str]:
-        """Return the full names of the nodes that publish them."""
-        return sorted({node for node, _ in self._publishers(joint_commands)})
+        """Return the full names of the nodes that publish them, as far as ROS knows them yet."""
+        return sorted({node for node, _ in self._publishers(joint_commands)
+                       if not node.endswith(UNNAMED_NODE)})
 
     def _publishers(self, joint_commands: Iterable[str]) -> Iterator[tuple[str, str]]:
         for topic in (*self._topics.names, *(joint_commands if self._joint_targets else ())):

@@ -1,6 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """``~/enable``, ``~/reset_fault`` and ``~/quick_stop``."""
 
+from types import SimpleNamespace
+from typing import Any
+
 from bridges import HASTY, LIFT, parameters, StartBridge
 from clients import Client, wait_until
 import pytest
@@ -11,6 +14,7 @@ from waiting import clock
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.ros.commands import CommandIntake
 from drive_can_bridge.ros.log import FEW
 
 DRIVE = 'drive_can_bridge: drive lift'
@@ -135,3 +139,11 @@ def test_a_stop_waits_for_no_other_service(bridge: StartBridge, client: Client) 
         assert answer.result().success
     finally:
         go_on.ring()
+
+
+@pytest.mark.interpreted    # calls a method of what only looks like its object
+def test_nodes_whose_names_have_not_arrived_yet_are_left_out() -> None:
+    seen: Any = SimpleNamespace(_publishers=lambda _: [
+        ('/teleop', '/conveyor/command/speed_setpoint'),
+        ('_NODE_NAMESPACE_UNKNOWN_/_NODE_NAME_UNKNOWN_', '/conveyor/command/speed_setpoint')])
+    assert CommandIntake.commanding_nodes(seen, []) == ['/teleop']
