@@ -26,7 +26,7 @@ _HEAD = """\
 opens nothing. Here, look for what is printed on the box, or for the interface of python-can (4.3
 to 4.6).
 
-The column *lines* goes between the braces of a bus, and the bit rate behind it. With the row
+The column *lines* goes between the braces of a bus, and the bit rate after it. With the row
 `slcan`:
 
 ```yaml
