@@ -297,9 +297,7 @@ def define(parser: ArgumentParser) -> None:
                         help='write what was found as a parameter file; one that exists, and '
                              'tables beside it, are asked for')
     parser.add_argument('--json', action='store_true',
-                        help='a document for each drive: protocol, station, certainty, text '
-                             '(a CANopen node that is not known to be one: protocol and '
-                             'certainty null)')
+                        help='a document for each drive: protocol, station, certainty, text')
 
 
 def run(args: Namespace) -> int:
@@ -434,18 +432,16 @@ def _command(args: Namespace) -> str:
 
 def _show(args: Namespace, scan: BusScan) -> None:
     sightings = scan.sightings
-    drives = _canopen_stations(sightings)
-    others = [(node, text) for node, text in sorted(scan.nodes.items()) if node not in drives]
     if args.json:
         print_json(*({'protocol': each.protocol, 'station': each.station,
                       'certainty': each.certainty.value, 'text': each.text}
-                     for each in sightings),
-                   *({'protocol': None, 'station': node, 'certainty': None, 'text': text}
-                     for node, text in others))
+                     for each in sightings))
         return
+    drives = _canopen_stations(sightings)
     rows = [(each.protocol, str(each.station), each.certainty.value, each.text)
             for each in sightings]
-    rows += [('CANopen node', str(node), '–', text) for node, text in others]
+    rows += [('CANopen node', str(node), '–', text)
+             for node, text in sorted(scan.nodes.items()) if node not in drives]
     if rows:
         print('\n'.join(column_lines(_COLUMNS, rows, numbers=('station',))))
     else:

@@ -514,24 +514,10 @@ def test_beside_a_bridge_all_drives_are_found_by_listening(
         drive_can('scan', '--interface', 'virtual', '--channel', 'all_families', '--bitrate',
                   '500k', '--listen', 0.5, '--passive')
     assert {(each['protocol'], each['station']) for each in map(json.loads, out.splitlines())} == {
-        *((drive.protocol, drive.station) for drive in played.drives.values()),
-        (None, 127)}        # the bridge has a heartbeat, too
+        (drive.protocol, drive.station) for drive in played.drives.values()}
     assert SAID['master'] in err and 'only listening' in err
     err = capsys.readouterr().err
     assert SAID['master'] in err and SAID['passive'] in err and '500000 bit/s, ' in err
-
-
-def test_a_program_hears_of_a_node_of_no_known_family_too(
-        bench: World, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ('scan', '--interface', 'virtual', '--channel', 'all_families', '--bitrate', '500k',
-             '--passive', '--listen', 3.0)
-    with Simulation(configuration_from_file(config_file('all_families.yaml')), bench.clock):
-        assert drive_can(*words) == 0
-        assert 'CANopen node        5  –         heartbeat ' in capsys.readouterr().out
-        assert drive_can(*words, '--json') == 0
-        document, = map(json.loads, capsys.readouterr().out.splitlines())
-    assert document.pop('text').startswith('heartbeat ')
-    assert document == {'protocol': None, 'station': 5, 'certainty': None}
 
 
 def test_what_was_not_asked_is_named_with_the_next_command(
