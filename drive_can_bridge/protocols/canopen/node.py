@@ -90,7 +90,11 @@ class WatchedNode:
     def begin(self, now: float) -> None:
         """Begin to use the node; what was heard of it before still counts."""
         self.free_at = self._blocked_until if self._blocked(now) else now
-        self._heartbeat_at = max(self._heartbeat_at, now)   # none was due while nobody listened
+        self.heartbeats_begin(now)      # none was due while nobody listened
+
+    def heartbeats_begin(self, now: float) -> None:
+        """Record that none was due before."""
+        self._heartbeat_at = max(self._heartbeat_at, now)
 
     def started(self, at: float) -> None:
         """Record when the node is started: unless its heartbeats know better, it is free then."""

@@ -233,7 +233,11 @@ class BringUp:
             return
         found = yield from self._read(PRODUCER, 0, 2)
         absent = self._objects.absent
-        if found == interval or not (refusal := (yield from self._put(PRODUCER, 0, interval, 2))):
+        if found == interval:
+            return
+        refusal = yield from self._put(PRODUCER, 0, interval, 2)
+        if not refusal:
+            node.heartbeats_begin(self._channel.now)    # after a restart it sends none until now
             return
         if absent or found and found >= 1000 * node.heartbeat_timeout:
             node.heartbeat_timeout = 0.0

@@ -1,12 +1,14 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """In which NMT state a node is, and what it may be asked there: a stop above all."""
 
+import math
+
 from builders import frame, read
 import pytest
 from saying import says
 from servo_builders import Axis, FITS, POSITION
 
-from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.events import Noted, StationLost
 from drive_can_bridge.core.frame import Frame
 
 PRE_OPERATIONAL, DISABLE = '000#8005', '605#2B40600007000000'
@@ -238,6 +240,26 @@ class TestRestarts:
         axis = running()
         axis.session.receive_frame(frame('705#00'), axis.now)
         assert DISABLE in axis.talk.sent()
+
+
+    def test_heartbeats_are_due_since_they_are_asked_for(self) -> None:
+        """1017h is 0 after a restart: until it is written, a slow set-up misses none."""
+        axis = Axis(parameter_timeout=0.05).online()
+        axis.beat_at = math.inf
+        restarted_at, axis.deaf = axis.now, True
+        for answer in axis.drive.restarts():
+            axis.says(str(answer))
+        axis.live(0.22)
+        axis.deaf = False
+        while not axis.drive.number(0x1017):
+            axis.live(0.001)
+        axis.beat_at = axis.now + 0.1
+        assert axis.beat_at > restarted_at + axis.session.configuration.options.heartbeat_timeout
+        axis.talk.events()
+        axis.live(0.5)
+        events = axis.talk.events(StationLost, Noted)
+        assert axis.session.online
+        assert events == []
 
 
 class TestStoppedAtTheEnd:
