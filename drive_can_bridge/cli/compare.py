@@ -21,9 +21,9 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import ConfigurationError, DriveCanError, ValueRefused
-from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.parameters import named_value, Parameter, Value
 from drive_can_bridge.core.profile import Profile
-from drive_can_bridge.core.text import printable, value_text
+from drive_can_bridge.core.text import printable
 
 #: of values without a profile that gives their resolution
 _RELATIVE_TOLERANCE = 1e-9
@@ -72,9 +72,7 @@ class Difference:
 
     def text(self, value: Value | None) -> str:
         """Return the value of one side for people."""
-        if value is None:
-            return _NONE
-        return value_text(value) if self.parameter is None else self.parameter.named(value)
+        return _NONE if value is None else named_value(self.parameter, value)
 
 
 @dataclass(frozen=True, slots=True)

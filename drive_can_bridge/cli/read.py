@@ -12,7 +12,7 @@ from drive_can_bridge.cli.drives import (
 from drive_can_bridge.cli.output import fitting_table, print_table
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome
 from drive_can_bridge.clock import Clock
-from drive_can_bridge.core.text import value_text
+from drive_can_bridge.core.parameters import named_value
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'raw', 'number', 'storage', 'description',
              'why not')
@@ -116,11 +116,7 @@ def document(drive: Drive, outcome: ReadOutcome) -> dict[str, Any]:
 
 def _shown(outcome: ReadOutcome) -> str:
     """Return a value, and its name beside it."""
-    if outcome.value is None:
-        return '–'
-    if outcome.parameter is None:
-        return value_text(outcome.value)
-    return outcome.parameter.named(outcome.value)
+    return '–' if outcome.value is None else named_value(outcome.parameter, outcome.value)
 
 
 def _rows(drives: Drives, outcomes: Sequence[tuple[Drive, ReadOutcome]],

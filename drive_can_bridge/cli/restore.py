@@ -19,8 +19,8 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import command_sentences, sentences
 from drive_can_bridge.core.codes import code_of
 from drive_can_bridge.core.messages import around
-from drive_can_bridge.core.parameters import Parameter, Storage, Value
-from drive_can_bridge.core.text import counted, printable, value_text
+from drive_can_bridge.core.parameters import named_value, Parameter, Storage, Value
+from drive_can_bridge.core.text import counted, printable
 from drive_can_bridge.process.critical_sections import Interruption, postponed
 
 #: s that a drive's identity is waited for
@@ -303,8 +303,7 @@ def _with_unit(drive: Drive, name: str, value: Value) -> str:
 
 
 def _named(drive: Drive, name: str, value: Value) -> str:
-    parameter = drive.find(name)
-    return value_text(value) if parameter is None else parameter.named(value)
+    return named_value(drive.find(name), value)
 
 
 def _unit(drive: Drive, name: str) -> str:

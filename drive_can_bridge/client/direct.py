@@ -259,9 +259,7 @@ class DirectDrive(Drive):
             return ''   # which its value is told
         owner = self._session.roles.owner(parameter)
         if owner is not None and owner[0] is Role.CONTROL:
-            refusal = controlled_by(owner[1])
-            return (sentences.bridge_sends_word() if refusal.row is sentences.use_enable
-                    else refusal)
+            return controlled_by(owner[1], sentences.bridge_sends_word)
         if owner is not None and owner[0] is Role.CYCLIC:
             return sentences.bridge_sends_setpoint(name=owner[1].name)
         return self._session.services.write_refusal(parameter)

@@ -375,5 +375,10 @@ class Parameter:
         return f' {self.unit}' if self.unit else ''
 
 
+def named_value(parameter: Parameter | None, value: Value) -> str:
+    """Return a value for people, as :meth:`Parameter.named`; None: an unknown parameter."""
+    return value_text(value) if parameter is None else parameter.named(value)
+
+
 def _in_words(ends: tuple[float, float]) -> str:
     return f'{value_text(ends[0])} to {value_text(ends[1])}'

@@ -43,13 +43,14 @@ def publish_it(parameter: Parameter) -> Sentence:
     return sentences.sent_cyclically(parameter.name)
 
 
-def controlled_by(own: Parameter) -> Sentence:
+def controlled_by(own: Parameter, word: Callable[[], Sentence] = sentences.use_enable) -> Sentence:
     """
     Return why what a drive is controlled by is not written by request.
 
     :param own: as the bridge writes it.
+    :param word: makes the reason for the control word.
     """
-    return sentences.bridge_sets_mode() if own.index == _MODE else sentences.use_enable()
+    return sentences.bridge_sets_mode() if own.index == _MODE else word()
 
 
 class Roles:

@@ -546,20 +546,19 @@ maps_unknown = Text(
 
 # -- frames that are not as they should be --------------------------------------------------------
 malformed = Text('{what}', do='see who else sends on this identifier')
+_JUST_LATE = ('just after a loss it is a late answer: see what slows the computer or the adapter '
+              'down')
 unasked = Text(
     '{what} that nobody asked for',
-    do='just after a loss it is a late answer: see what slows the computer or the adapter down; '
-       'else look for a second master, or a second station with the same number')
+    do=f'{_JUST_LATE}; else look for a second master, or a second station with the same number')
 nobody_asked = Text(
     '{frame}: nobody asked for it',
-    do='just after a loss it is a late answer: see what slows the computer or the adapter down; '
-       'else look for a second master, or a second station with the same number')
+    do=f'{_JUST_LATE}; else look for a second master, or a second station with the same number')
 of_somebody_else = Text('{frame}: of somebody else', do='see who sends on this identifier')
 not_of_this_drive = Text('{frame}: not of this drive', do='see who sends on this identifier')
 unasked_pkw = Text(
     'PKW response that nobody asked for: {message}',
-    do='just after a loss it is a late answer: see what slows the computer or the adapter down; '
-       'else look for a second master')
+    do=f'{_JUST_LATE}; else look for a second master')
 short_process_data = Text(
     'process data with {found} values, {needed} needed',
     do='compare cyclic_response with the settings of the inverter')
