@@ -255,7 +255,7 @@ no_serial_port = Text(
     'socket://HOST:PORT and rfc2217://HOST:PORT',
     do='see drive_can adapters, and ls /dev/serial/by-id')
 bitrate_assumed = Text(
-    'bitrate is not given: {bitrate}',
+    'bitrate is not given: {bitrate} is assumed',
     do='write the bit rate of the drives: an adapter at another one disturbs the bus')
 no_bitrate = Text(
     '{bitrate} is impossible with {interface}, allowed is one of {allowed}',
