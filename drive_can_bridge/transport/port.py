@@ -101,6 +101,9 @@ class Port(EndPoint):
         # what python-can documents for adapters to implement; the ``recv`` around it looks at the
         # system clock, and waits for hours when that is set back
         self._receive = bus._recv_internal
+        if type(bus)._recv_internal is can.BusABC._recv_internal:
+            # plugins for python-can replace ``recv`` itself
+            self._receive = lambda timeout: (bus.recv(timeout), False)
         self._matches = bus._matches_filters
         self._kernel_errors = kernel_errors
         self._below: Below | None = getattr(bus, 'drive_can_below', None)

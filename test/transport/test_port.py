@@ -102,6 +102,25 @@ def test_filters_of_adapters_that_have_none(bus: FakeBus) -> None:
     assert port.rejected_frames == 1
 
 
+def test_adapter_that_replaces_recv_itself() -> None:
+    """As the plugins python-can-remote 0.3.0, can-cannelloni 0.1.0, can-waveshare 0.1.0 do."""
+    class Replaces(FakeBus):
+        _recv_internal = can.BusABC._recv_internal      # raises NotImplementedError
+
+        def recv(self, timeout: float | None = None) -> can.Message | None:
+            return FakeBus._recv_internal(self, timeout)[0]
+
+    bus = Replaces()
+    bus.set_filters([{'can_id': 0x123, 'can_mask': 0x7FF, 'extended': False}])
+    port = Port(bus, REAL)
+    bus.coming += [can.Message(arbitration_id=0x124, is_extended_id=False),
+                   can.Message(arbitration_id=0x123, is_extended_id=False)]
+    assert port.receive(0.02) is None       # not every such plugin filters
+    assert port.receive(0.02) == Frame(0x123, b'', False)
+    assert port.receive(0.02) is None
+    assert bus.waited == [0.02] * 3
+
+
 @pytest.mark.parametrize('step', [-3600.0, 3600.0], ids=['back', 'forward'])
 def test_clock_that_is_set_while_waiting(bus: FakeBus, monkeypatch: pytest.MonkeyPatch,
                                          step: float) -> None:
