@@ -7,7 +7,7 @@ from contextlib import suppress
 import re
 import shlex
 
-from drive_can_bridge.cli.command import FAILED, print_json, WrongUsage
+from drive_can_bridge.cli.command import complain, FAILED, print_json, WrongUsage
 from drive_can_bridge.cli.drives import (
     add_words, by_short_names, complete_words, opened, source_of, split_words)
 from drive_can_bridge.cli.output import counting, print_table
@@ -205,6 +205,13 @@ def _show(args: Namespace, drives: Drives, wanted: dict[str, str],
             f'not written: {result}' if refused else result))
     if rows:
         print_table(_HEADINGS, rows, numbers=('value',))
+    for drive, outcome in outcomes:
+        value = _shown(drive, outcome, wanted[outcome.name])
+        twin = None if not outcome.ok or isinstance(value, str) else (
+            drive.unnamed(outcome.name, value))
+        if twin is not None:
+            complain(command_sentences.value_without_name(
+                outcome.name, value, [f'{raw} {name}' for raw, name in twin.values], drive.name))
     losers = [drive for drive, outcome in outcomes if _is_lost(outcome)]
     if args.json:
         return

@@ -239,6 +239,10 @@ class Drive(ABC):
         """
         return parameter.value_from_raw(self._directory.raw_from_user(parameter, value))
 
+    def unnamed(self, name: str, value: Value) -> Parameter | None:
+        """Return the listed parameter that names its values, and not this one, if any."""
+        return self._directory.unnamed(name, value)
+
     def contradicted(self, values: Mapping[str, Value]) -> dict[str, str]:
         """
         Return which values cannot be written together, and why: two for one parameter.

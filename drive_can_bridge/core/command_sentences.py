@@ -234,6 +234,11 @@ not_read = Text('{drive}: {name} could not be read: {reason}', do='what the reas
 other_value_refused = Text(
     'another value of this command is refused',
     do='correct the other value; nothing was written')
+value_without_name = Text(
+    'warning: {drive}: {name} is {value} now, which is none of the values that the profile names '
+    '({names:, }): what the drive does then, its manual says',
+    fields='name value names drive',
+    do='look whether its manual has that value')
 waiting_for_drive = Text(
     '{drive}: answers no more; waiting up to {patience:g} s for it, so that {aim}',
     do='see what it does; power it up again where it stays silent')

@@ -13,7 +13,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import (
-    AccessMode, Parameter, ParameterType, Storage, ValueKind)
+    AccessMode, Parameter, ParameterType, Storage, Value, ValueKind)
 from drive_can_bridge.core.text import nearest, printable
 
 # Strictest first: where several listed parameters have one address, a raw name obeys them all.
@@ -62,6 +62,15 @@ class ParameterDirectory:
         if parameter.listed:
             return [parameter]
         return [other for other in self.listed.values() if _place(other) == _place(parameter)]
+
+    def unnamed(self, name: str, value: Value) -> Parameter | None:
+        """Return the listed parameter that has names for values, but none for this one, if any."""
+        parameter = self.find(name)
+        if parameter is None:
+            return None
+        word = parameter.word_from_raw(self.raw_from_user(parameter, value))
+        return next((twin for twin in self.twins(parameter) if twin.values and (
+            twin.raw_from_word(word) not in dict(twin.values))), None)
 
     def unknown(self, name: str, *, hint: bool = True) -> Sentence:
         """Return that a name is unknown, with the nearest known one (which takes milliseconds)."""

@@ -611,6 +611,10 @@ no_heartbeat_producer = Text(
 nothing_stops = Text(
     'nothing stops this drive when the bridge dies',
     do='see bridge_heartbeat; give the drive a watchdog of its own (1016h, 6007h)')
+stop_option_unknown = Text(
+    '{index:04X}h = {value}: CiA 402 has no such value, and what the drive does then at {event} '
+    'is not known',
+    do='write one that its manual lists, or try it, with the motor uncoupled')
 watch_unknown = Text(
     'whether anything stops this drive when the bridge dies is not known ({why})',
     do='look at 1016h and 6007h of the drive; try it, with the motor uncoupled')

@@ -9,6 +9,7 @@ from client_builders import a_world, CONVEYOR, World
 import pytest
 
 from drive_can_bridge.cli.main import main
+from drive_can_bridge.core import command_sentences
 
 pytestmark = pytest.mark.usefixtures('bench')
 
@@ -50,6 +51,18 @@ def test_there_and_back(world: World, capsys: pytest.CaptureFixture[str], word: 
     code, said = run(world, capsys, 'read', 'conveyor', 'source', '--json')
     document = json.loads(said)
     assert (document['value'], document['text']) == (value, shown.partition(' ')[2])
+
+
+def test_a_value_without_a_name_is_written_with_a_warning(
+        world: World, capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (['source=99'], ['source=99', '--json'], ['p70=99']):
+        assert main(['write', 'conveyor', *words, '--params-file', str(world.file)]) == 0
+        assert world.drives['conveyor'].value('source') == 99
+        assert capsys.readouterr().err.rstrip() == command_sentences.value_without_name(
+            words[0].partition('=')[0], 99, ['0 terminals', '3 bus', '4 panel of the drive'],
+            'conveyor')
+    assert main(['write', 'conveyor', 'source=3', '--params-file', str(world.file)]) == 0
+    assert not capsys.readouterr().err
 
 
 def test_an_unknown_name_is_told_the_known_ones(

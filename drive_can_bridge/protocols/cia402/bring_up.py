@@ -24,7 +24,7 @@ from drive_can_bridge.core.stop_duty import Happened
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import START_PAUSE, WatchedNode
-from drive_can_bridge.protocols.cia402 import pdo, states
+from drive_can_bridge.protocols.cia402 import pdo, states, stop_options
 from drive_can_bridge.protocols.cia402.beat import Beat
 from drive_can_bridge.protocols.cia402.control import DISABLE_WORDS, DriveRules
 from drive_can_bridge.protocols.cia402.limits import LimitCheck
@@ -140,8 +140,8 @@ class BringUp:
     # -- one object -------------------------------------------------------------------------------
 
     def tell(self, text: Sentence, *, warning: bool = True) -> None:
-        """Report once what the drive lacks."""
-        if text not in self._told:
+        """Report once what the drive lacks, if anything."""
+        if text and text not in self._told:
             self._told.add(text)
             self._session.report.note(Noted(text, warning=warning))
 
@@ -216,12 +216,14 @@ class BringUp:
                 self.options.pop(index, None)
             else:
                 self.options[index] = value
+                self.tell(stop_options.unknown(index, value))
             self._rules.standing.quick_stop_option = self.options.get(states.QUICK_STOP_OPTION)
 
     def learn_again(self) -> Procedure[None]:
         """Read it once more: users have written it."""
         try:
             yield from self._learn()
+            yield from self.watch.learn_again()
         except SetUpEnd:    # nobody answers: what was read stands
             return
 

@@ -58,7 +58,7 @@ from drive_can_bridge.protocols.cia402.sdo_stop import SdoStop, StopProcedure
 from drive_can_bridge.protocols.cia402.standing import Standing
 from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, INTERPOLATION_MAX, MODES, ServoState, state_of, STATUS_PARAMETER)
-from drive_can_bridge.protocols.cia402.stop_options import stops_by
+from drive_can_bridge.protocols.cia402.stop_options import OPTIONS, stops_by
 from drive_can_bridge.protocols.cia402.transactor import (
     Procedure, SdoChannel, SdoTransactor, Transfer, TransferResult)
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange, EXPIRY_SPACING
@@ -528,7 +528,7 @@ class Cia402Session(Session):
     def request_answered(self, request: Request, outcomes: Outcomes) -> None:
         # also where the answer was lost: it may have been written
         if not self.serving and isinstance(request, WriteRequest) and any(
-                parameter.index in states.STOP_OPTIONS for parameter, _ in request.items):
+                parameter.index in OPTIONS for parameter, _ in request.items):
             self._channel.run(self._bring_up.learn_again(), lambda _: None, self._channel.now)
 
     # -- limits -----------------------------------------------------------------------------------

@@ -17,12 +17,12 @@ from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo, states
 from drive_can_bridge.protocols.cia402.objects import at_object, differs, ObjectAccess
 from drive_can_bridge.protocols.cia402.pdo import request_pdos
+from drive_can_bridge.protocols.cia402.stop_options import in_words, unknown
 from drive_can_bridge.protocols.cia402.transactor import Procedure, Transfer
 
 CONSUMER, GUARD_TIME, LIFE_FACTOR = 0x1016, 0x100C, 0x100D
 #: the bridge's heartbeat may be late by so many intervals
 WATCH_INTERVALS = 3
-_ACTIONS = {0: 'nothing', 1: 'fault', 2: 'power off, it coasts', 3: 'quick stop'}
 
 
 class BridgeWatch:
@@ -42,6 +42,7 @@ class BridgeWatch:
         self._attempts = drive.parameter_retries + 1
         self._received = request_pdos(drive)
         self._unsure = NOTHING      # why nobody knows whether the drive watches
+        self._watching: int | None = None   # sub-index by which it does
 
     def set_up(self) -> Procedure[None]:
         """Set up what stops the drive when the bridge dies, and learn what does."""
@@ -54,8 +55,18 @@ class BridgeWatch:
         if interval > 0.0:
             slot = yield from (self._write_watch if mapping == 'configure' else
                                self._read_watch)(interval)
+        self._watching = slot
+        yield from self._learn(slot)
+
+    def learn_again(self) -> Procedure[None]:
+        """Read what the drive does then once more: users have written it."""
+        if self.text and self._options.mapping != 'assume':
+            yield from self._learn(self._watching)
+
+    def _learn(self, slot: int | None) -> Procedure[None]:
         guarding, time_out = (yield from self._guarding()), (yield from self._time_out())
-        option = yield from self._objects.read(states.ABORT_CONNECTION_OPTION, 0, 2)
+        option = yield from self._objects.read(
+            states.ABORT_CONNECTION_OPTION, 0, 2, signed=True)
         refused = self._refused(states.ABORT_CONNECTION_OPTION) if option is None else NOTHING
         alone = [each for each in (guarding, time_out) if each]
         for each in alone:
@@ -70,8 +81,9 @@ class BridgeWatch:
         elif option is None:
             self._unknown(refused or 'no 6007h')
         else:
-            self.text = (f'{_ACTIONS.get(option, "as the manual says")} (6007h = {option}), by '
+            self.text = (f'{in_words(states.ABORT_CONNECTION_OPTION, option)}, by '
                          f'{at_object(CONSUMER, slot)}')
+            self._tell(unknown(states.ABORT_CONNECTION_OPTION, option))
 
     def _unknown(self, why: str) -> None:
         self.text = f'not known ({why})'

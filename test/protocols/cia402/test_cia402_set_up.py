@@ -3,9 +3,10 @@
 
 from typing import Any
 
+from builders import INT16, parameter, write
 import pytest
 from saying import says
-from servo_builders import Axis, FITS, POSITION, TORQUE, VELOCITY
+from servo_builders import Axis, FITS, POSITION, TABLE, TORQUE, VELOCITY
 from stacks import EightEntries, SignedLengths
 
 from drive_can_bridge.core.control import ControlAction
@@ -338,6 +339,25 @@ class TestMode:
         assert axis.session.online
 
 
+class TestStopOptions:
+
+    @pytest.mark.parametrize(('index', 'value'), [
+        (0x605A, 99), (0x605B, 2), (0x605C, 99), (0x6007, 4)])
+    def test_one_that_the_standard_does_not_have_is_a_warning(
+            self, index: int, value: int) -> None:
+        expected = says('stop_option_unknown', index=index, value=value)
+        assert notes(meet(objects={(index, 0): bytes([value, 0])})).count(expected) == 1
+        option = parameter('option', None, index=index, type=INT16)
+        axis = meet(objects={(index, 0): b'\1\0'}, table=(*TABLE, option))
+        assert not notes(axis)
+        axis.deliver(axis.talk.submits(write((option, value)), axis.now))
+        axis.live(0.2)
+        assert notes(axis) == [expected]
+
+    def test_negative_ones_are_the_makers_own(self) -> None:
+        assert not notes(meet(objects={(0x605A, 0): b'\xFE\xFF', (0x6007, 0): b'\xFF\xFF'}))
+
+
 class TestWatches:
 
     @pytest.mark.parametrize(('entries', 'wanted'), [
@@ -358,6 +378,16 @@ class TestWatches:
         assert notes(axis).count(says('nothing_stops')) == 1
         assert axis.session.online
         assert axis.session.facts()['stops_by'].endswith('bridge lost: nothing')
+
+    def test_what_users_write_is_learnt_again(self) -> None:
+        option = parameter('abort_connection_option', None, index=0x6007, type=INT16)
+        axis = meet(table=(*TABLE, option))
+        assert says('nothing_stops') not in notes(axis)
+        for value, text in ((0, 'nothing'), (3, 'quick stop (6007h = 3), by 1016h.01h')):
+            axis.deliver(axis.talk.submits(write((option, value)), axis.now))
+            axis.live(0.2)
+            assert axis.session.facts()['stops_by'].endswith(f'bridge lost: {text}')
+        assert notes(axis).count(says('nothing_stops')) == 1
 
     def test_no_1016h(self) -> None:
         assert says('nothing_stops') in notes(meet(lacks=(0x1016, 0)))
