@@ -29,7 +29,7 @@ from drive_can_bridge.core import complaints
 from drive_can_bridge.core.complaints import hint, suggestion
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.sentences import uncoded
-from drive_can_bridge.core.text import describe_type, value_text
+from drive_can_bridge.core.text import describe_type, nearest, value_text
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Family
 
@@ -89,6 +89,11 @@ def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, Sente
     """Yield path of the culprit, sentence, and path of the line for every part of an error."""
     path: Path = tuple(error.absolute_path)
     if error.validator == 'required':
+        meant = _meant(error, path, tree)
+        if meant is not None:
+            lacking = [key for key in error.validator_value if key not in error.instance]
+            yield path, complaints.other_entry_meant(lacking=', '.join(lacking), near=meant), path
+            return
         for key in error.validator_value:
             here = (*path, key)
             if key in error.instance or here in tree.damaged or path in tree.incomplete:
@@ -121,6 +126,19 @@ def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, Sente
         yield path[:-1], _message(error), path
     else:
         yield path, _message(error), path
+
+
+def _meant(error: ValidationError, path: Path, tree: Tree) -> str | None:
+    """Return the bus or drive that one lacking most is probably meant to be, if any."""
+    required = set(error.validator_value)
+    if len(path) != 2 or path in tree.incomplete or any(
+            (*path, key) in tree.damaged for key in required):
+        return None
+    lacking = required.difference(error.instance)
+    return nearest(str(path[1]), [
+        name for name, entry in tree.data[str(path[0])].items()
+        if isinstance(entry, dict) and required <= entry.keys()
+    ]) if 2 * len(lacking) >= len(required) else None
 
 
 def _key_of(error: ValidationError) -> object:

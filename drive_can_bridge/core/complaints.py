@@ -51,6 +51,9 @@ missing = Text('missing, allowed is {allowed}', do='add the key, with a value th
 missing_called = Text(
     'missing, allowed is {allowed}: {theirs} is called {ours} here',
     do='call it as it is called here')
+other_entry_meant = Text(
+    "no {lacking}, did you mean '{near}'?",
+    do='write that name, or complete the entry where it is another one')
 unknown_key = Text(
     'unknown key, {hint}',
     do='write the key that is named, or leave yours out; docs/profiles.md and '

@@ -80,6 +80,7 @@ def test_there_are_many_and_the_file_itself_is_good(
     (complaints.no_space, 'a space is missing'),
     (complaints.no_colon, 'a colon is missing'),
     (complaints.two_keys_in_line, 'two keys in one line'),
+    (complaints.other_entry_meant, 'another entry where one was meant: a drive'),
     (complaints.not_below, 'nothing is indented below the drive'),
     (complaints.without_head, 'without a head'),
     (complaints.parameters_missing, 'without ros__parameters'),
