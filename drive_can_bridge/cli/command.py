@@ -174,6 +174,24 @@ def add_params_file(parser: ArgumentParser, help_text: str) -> None:
                         help=f'{help_text} (default: ${PARAMS_FILE})')
 
 
+def add_drive_words(parser: ArgumentParser, completer: Callable[..., list[str]], metavar: str,
+                    nargs: str, help_text: str, *, namespace_help: str, yes: str) -> None:
+    """
+    Add positional arguments that name drives, and the options that all such commands have.
+
+    :param completer: proposes words to the shell.
+    :param metavar: how the words are written, as usage lines have it.
+    :param yes: what ``--yes`` means.
+    """
+    parser.allow_abbrev = False
+    parser.usage = f'%(prog)s [option …] {metavar}'     # argparse would repeat all of them
+    words = parser.add_argument('words', metavar=metavar, nargs=nargs, help=help_text)
+    words.completer = completer     # type: ignore[attr-defined]  # for argcomplete
+    parser.add_argument('--namespace', metavar='NS', type=namespace, help=namespace_help)
+    parser.add_argument('--yes', action='store_true', help=yes)
+    parser.add_argument('--json', action='store_true', help='a JSON document a line')
+
+
 def add_words_for_a_bridge(parser: ArgumentParser, metavar: str, nargs: str, help_text: str, *,
                            namespace_help: str, yes: str) -> None:
     """
@@ -184,13 +202,8 @@ def add_words_for_a_bridge(parser: ArgumentParser, metavar: str, nargs: str, hel
     :param metavar: how the words are written, as usage lines have it.
     :param yes: what ``--yes`` means.
     """
-    parser.allow_abbrev = False
-    parser.usage = f'%(prog)s [option …] {metavar}'
-    words = parser.add_argument('words', metavar=metavar, nargs=nargs, help=help_text)
-    words.completer = _complete_drives      # type: ignore[attr-defined]  # for argcomplete
-    parser.add_argument('--namespace', metavar='NS', type=namespace, help=namespace_help)
-    parser.add_argument('--json', action='store_true', help='a JSON document a line')
-    parser.add_argument('--yes', action='store_true', help=yes)
+    add_drive_words(parser, _complete_drives, metavar, nargs, help_text,
+                    namespace_help=namespace_help, yes=yes)
     parser.add_argument('-p', '--params-file', metavar='FILE',
                         help='refused: goes through the running bridge only')
 

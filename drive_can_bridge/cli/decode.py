@@ -4,13 +4,14 @@
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, closing, ExitStack, nullcontext
+from functools import partial
 from itertools import chain
-import json
 from pathlib import Path
 import re
 import sys
 
-from drive_can_bridge.cli.command import add_params_file, add_seconds, complain, FAILED, WrongUsage
+from drive_can_bridge.cli.command import (
+    add_params_file, add_seconds, complain, FAILED, print_json, WrongUsage)
 from drive_can_bridge.cli.record import Taps
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core import command_sentences
@@ -201,7 +202,7 @@ def _sinks(args: Namespace, configuration: BridgeConfiguration, selection: Selec
         stream = stack.enter_context(open_text(args.csv, newline=''))
         sinks.append(TableWriter(stream, drives))
     if _prints(args):
-        write = _flushed if args.live else sys.stdout.write
+        write = partial(print, end='', flush=True) if args.live else sys.stdout.write
         sinks.append(LineWriter(write, selection, as_json=args.json))
     return sinks, endings
 
@@ -215,10 +216,6 @@ def _together(sinks: list[Sink]) -> Sink:
             sink(bus, telegram)
     return take
 
-
-def _flushed(line: str) -> None:
-    sys.stdout.write(line)
-    sys.stdout.flush()
 
 
 def _live(args: Namespace, configuration: BridgeConfiguration, tracer: Tracer) -> int:
@@ -249,11 +246,9 @@ def _draw(plotter: Plotter, path: str) -> None:
 
 def _summarise(tracer: Tracer, wanted: Callable[[str], bool], *, as_json: bool) -> None:
     if as_json:
-        for document in summary_documents(tracer, wanted):
-            print(json.dumps(document))
+        print_json(*summary_documents(tracer, wanted))
     else:
-        for line in summary_lines(tracer, wanted):
-            print(line)
+        print('\n'.join(summary_lines(tracer, wanted)))
 
 
 class _Complaints:

@@ -12,7 +12,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from drive_can_bridge.cli.command import complain, namespace, WrongUsage
+from drive_can_bridge.cli.command import add_drive_words, complain, namespace, WrongUsage
 from drive_can_bridge.cli.output import counting, waiting
 from drive_can_bridge.client import find_source
 from drive_can_bridge.client.drive import Drive, Drives, DriveSource, ReadOutcome
@@ -31,20 +31,15 @@ def add_words(parser: ArgumentParser, completer: Callable[..., list[str]], metav
     :param completer: proposes words to the shell.
     :param metavar: how the words are written, as usage lines have it.
     """
-    parser.allow_abbrev = False
-    words = parser.add_argument('words', metavar=metavar, nargs=nargs, help=help_text)
-    words.completer = completer     # type: ignore[attr-defined]  # for argcomplete
-    parser.usage = f'%(prog)s [option …] {metavar}'     # argparse would repeat all of them
     parser.add_argument('-p', '--params-file', metavar='FILE', type=Path,
                         help='open the buses of this parameter file; else the drives of a running '
                              'bridge are asked through it')
-    parser.add_argument('--namespace', metavar='NS', type=namespace,
-                        help='of the running bridge, where there are several')
     parser.add_argument('--nmt-start', action='store_true',
                         help='with --params-file: start CANopen nodes first, because others '
                              'answer no PKW')
-    parser.add_argument('--yes', action='store_true', help='answer every question with yes')
-    parser.add_argument('--json', action='store_true', help='a JSON document a line')
+    add_drive_words(parser, completer, metavar, nargs, help_text,
+                    namespace_help='of the running bridge, where there are several',
+                    yes='answer every question with yes')
 
 
 @contextmanager

@@ -69,7 +69,7 @@ class Adapters(Protocol):
     def check_name(self, interface: str, name: str) -> Sentence | None:
         """Return why the name of an adapter is wrong; None: it is not."""
 
-    def traits(self, bus: BusConfiguration) -> AdapterTraits | None:
+    def traits_of(self, bus: BusConfiguration) -> AdapterTraits | None:
         """Return what is known of the adapter of a bus; None: nothing."""
 
 

@@ -268,7 +268,7 @@ def _check_together(tree: Tree, buses: Mapping[str, BusConfiguration],
         if ('buses', bus.name, 'bitrate') not in tree.damaged:
             check_load(tree, bus, here)
             check_rounds(tree, bus, here)
-            traits = None if adapters is None else adapters.traits(bus)
+            traits = None if adapters is None else adapters.traits_of(bus)
             if traits is not None:
                 check_adapter(tree, bus, [each for each in here if each.name in placed], traits)
         check_neighbours(tree, [drive for drive in here if drive.name in placed])

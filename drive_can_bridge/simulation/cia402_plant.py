@@ -15,9 +15,7 @@ import math
 import random
 from typing import Any, NamedTuple
 
-from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import AccessMode, Parameter, ParameterType
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.cia402 import states
@@ -25,6 +23,7 @@ from drive_can_bridge.simulation import quantities
 from drive_can_bridge.simulation.canopen.pdos import Checks, PdoHabits
 from drive_can_bridge.simulation.canopen.sdo import Place
 from drive_can_bridge.simulation.drive_machine import FAULTS, Machine, MachineState, OperatingState
+from drive_can_bridge.simulation.faults import number, read_keys
 from drive_can_bridge.simulation.motor import (
     COAST_TIME, FRICTION_TORQUE, INERTIA_TORQUE, LOAD_TORQUE, Motor, Rates, SINKING_SPEED, Travel,
     WARNING_TEMPERATURE)
@@ -136,23 +135,7 @@ class Habits(PdoHabits):
 
         :raises ValueRefused: with what is allowed.
         """
-        given: dict[str, Any] = {}
-        for part in text.split(','):
-            key, _, value = map(str.strip, part.partition('='))
-            try:
-                given[key] = _HABITS[key][1](value)
-            except (KeyError, ValueError):
-                raise ValueRefused(command_sentences.habit_impossible(
-                    part=part.strip(), allowed=', '.join(
-                        f'{name}={what}' for name, (what, _) in _HABITS.items()))) from None
-        return cls(**given)
-
-
-def _seconds(text: str) -> float:
-    seconds = float(text)
-    if not 0.0 <= seconds <= 60.0:      # not a number is neither
-        raise ValueError
-    return seconds
+        return cls(**read_keys(text, _HABITS))
 
 
 def _types(text: str) -> frozenset[int]:
@@ -169,7 +152,7 @@ def _switch(text: str) -> bool:
 #: keys of habits in a text, with their parsers
 _HABITS: Mapping[str, tuple[str, Callable[[str], Any]]] = {
     'mapping': ('|'.join(each.value for each in Checks), Checks),
-    'start': ('0…60', _seconds),
+    'start': ('0…60', number(float, 0.0, 60.0)),
     'types': ('1+254+255', _types),
     **dict.fromkeys(('fixed_mapping', 'no_remote', 'mode_shown_early', 'leaves_quick_stop',
                      'stand_bit', 'ramp_bits'), ('0|1', _switch)),

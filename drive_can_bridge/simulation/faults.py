@@ -6,7 +6,7 @@ A fault is written ``silent`` or ``late=0.15``. Some are states, which add up an
 ``ok``; some happen once.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 import heapq
@@ -20,7 +20,8 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.text import nearest
 
 
-def _number(kind: type[Any], low: float, high: float) -> Callable[[str], Any]:
+def number(kind: type[Any], low: float, high: float) -> Callable[[str], Any]:
+    """Return a function that reads a number within limits."""
     def convert(text: str) -> Any:
         value = kind(text)
         if not low <= value <= high:    # nor is what is no number
@@ -36,8 +37,27 @@ def _pair(text: str) -> str:
     return f'{first.strip()}:{second.strip()}'
 
 
-_seconds = _number(float, 0.0, 3600.0)
-_count = _number(int, 1, math.inf)
+def read_keys(text: str, keys: Mapping[str, tuple[str, Callable[[str], Any]]]) -> dict[str, Any]:
+    """
+    Read ``load=0.3,noise=1``.
+
+    :param keys: what is allowed, in words and as a function.
+    :raises ValueRefused: with what is allowed.
+    """
+    given: dict[str, Any] = {}
+    for part in text.split(','):
+        key, _, value = map(str.strip, part.partition('='))
+        try:
+            given[key] = keys[key][1](value)
+        except (KeyError, ValueError):
+            raise ValueRefused(command_sentences.habit_impossible(
+                part=part.strip(), allowed=', '.join(
+                    f'{name}={what}' for name, (what, _) in keys.items()))) from None
+    return given
+
+
+_seconds = number(float, 0.0, 3600.0)
+_count = number(int, 1, math.inf)
 
 
 class FaultKind(Enum):
@@ -46,7 +66,7 @@ class FaultKind(Enum):
     SILENT = 'silent', 'obeys, but answers nothing'
     LATE = 'late=SECONDS', 'answers that much later (0 to 3600)', _seconds
     DROP = 'drop=N', 'every Nth answer is lost (1: all)', _count
-    LENGTH = 'length=BYTES', 'answers have 0 to 8 data bytes', _number(int, 0, 8)
+    LENGTH = 'length=BYTES', 'answers have 0 to 8 data bytes', number(int, 0, 8)
     FOREIGN = 'foreign', 'frames nobody should send accompany the answers'
     DUPLICATE = 'duplicate', 'each answer is sent twice'
     STUCK = 'stuck=PARAMETER', 'writes to the parameter have no effect', str

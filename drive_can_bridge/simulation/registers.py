@@ -13,12 +13,11 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
-from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.errors import DriveCanError, ValueRefused
+from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.simulation.drive_machine import OperatingState
-from drive_can_bridge.simulation.faults import Fault, FaultKind
+from drive_can_bridge.simulation.faults import Fault, FaultKind, number, read_keys
 from drive_can_bridge.simulation.quantities import clamp, nearest_raw
 
 
@@ -90,21 +89,9 @@ class Mechanics:
 
         :raises ValueRefused: with what is allowed.
         """
-        highest = {'load': 1.0, 'noise': 100, 'brake': 1}
-        given: dict[str, float] = {}
-        for part in text.split(','):
-            key, _, value = map(str.strip, part.partition('='))
-            try:
-                given[key] = type(highest[key])(value)
-                # not a number is neither below nor above
-                if not 0 <= given[key] <= highest[key]:
-                    raise ValueError
-            except (KeyError, ValueError):
-                allowed = ', '.join(f'{name}=0…{most:g}' for name, most in highest.items())
-                raise ValueRefused(command_sentences.habit_impossible(
-                    part=part.strip(), allowed=allowed),
-                                   ) from None
-        return cls(**given)  # type: ignore[arg-type]  # each has the type of its range
+        return cls(**read_keys(text, {
+            'load': ('0…1', number(float, 0.0, 1.0)), 'noise': ('0…100', number(int, 0, 100)),
+            'brake': ('0…1', number(int, 0, 1))}))
 
 
 class AccessRefused(DriveCanError):

@@ -21,6 +21,7 @@ offset size     of an object (little-endian)
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from datetime import datetime, timezone
+from pathlib import Path
 import struct
 from struct import Struct
 from typing import BinaryIO, NamedTuple
@@ -68,26 +69,27 @@ class _Object(NamedTuple):
     content: bytes
 
 
-def read_blf(file: BinaryIO, complain: Complain, passed: Counter[str]) -> Iterator[Record]:
+def read_blf(path: Path, complain: Complain, passed: Counter[str]) -> Iterator[Record]:
     """
     Read the entries of a file.
 
     :param passed: counts what has no entry.
     """
-    header = file.read(_FILE_HEADER.size)
-    if len(header) < _FILE_HEADER.size:
-        complain(command_sentences.trace_cut())
-        return
-    begin, size = _begin(header)
-    file.seek(max(size, _FILE_HEADER.size))
-    for number, found in enumerate(_objects(file, complain, passed), 1):
-        try:
-            record = _entry(found, begin + found.time, passed)
-        except struct.error:
-            complain(command_sentences.trace_object_short(number=number, kind=found.kind))
-            continue
-        if record is not None:
-            yield record
+    with path.open('rb') as file:
+        header = file.read(_FILE_HEADER.size)
+        if len(header) < _FILE_HEADER.size:
+            complain(command_sentences.trace_cut())
+            return
+        begin, size = _begin(header)
+        file.seek(max(size, _FILE_HEADER.size))
+        for number, found in enumerate(_objects(file, complain, passed), 1):
+            try:
+                record = _entry(found, begin + found.time, passed)
+            except struct.error:
+                complain(command_sentences.trace_object_short(number=number, kind=found.kind))
+                continue
+            if record is not None:
+                yield record
 
 
 def _begin(header: bytes) -> tuple[float, int]:

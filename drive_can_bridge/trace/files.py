@@ -173,28 +173,18 @@ def _tell_passed(passed: Counter[str], complain: Complain) -> None:
             + (', …' if len(passed) > _PASSED_MAX else ''))
 
 
-def _blf_records(path: Path, complain: Complain) -> Iterator[Record]:
-    passed: Counter[str] = Counter()
-    with path.open('rb') as file:
-        yield from _possible(read_blf(file, complain, passed), complain)
-    _tell_passed(passed, complain)
-
-
-def _capture_records(path: Path, complain: Complain) -> Iterator[Record]:
-    passed: Counter[str] = Counter()
-    yield from _possible(read_capture(path, complain, passed), complain)
-    _tell_passed(passed, complain)
-
-
-def _possible(records: Iterator[Record], complain: Complain) -> Iterator[Record]:
+def _entries(read: Callable[[Path, Complain, Counter[str]], Iterator[Record]], path: Path,
+             complain: Complain) -> Iterator[Record]:
     """Yield the entries that are possible; report the others."""
-    for number, record in enumerate(records, 1):
+    passed: Counter[str] = Counter()
+    for number, record in enumerate(read(path, complain, passed), 1):
         try:
             record = checked(record)
         except ValueError as error:
             complain(f'entry {number}: {error}')
         else:
             yield record
+    _tell_passed(passed, complain)
 
 
 def _tell_wrong(suffix: str, lines: _Numbered, complain: Complain, text: str) -> None:
@@ -263,11 +253,6 @@ def _text_records(suffix: str, stream: Iterable[str], complain: Complain) -> Ite
         logger.removeHandler(heard)
 
 
-def _measured_records(path: Path, complain: Complain) -> Iterator[Record]:
-    passed: Counter[str] = Counter()
-    yield from _possible(read_measured(path, complain, passed), complain)
-    _tell_passed(passed, complain)
-
 
 def _database_records(path: Path, complain: Complain) -> Iterator[Record]:
     """Read a database of python-can's writer."""
@@ -292,8 +277,9 @@ def _database_records(path: Path, complain: Complain) -> Iterator[Record]:
 
 
 _BINARY_RECORDS: dict[str, Callable[[Path, Complain], Iterator[Record]]] = {
-    '.blf': _blf_records, '.db': _database_records, '.mf4': _measured_records,
-    '.pcap': _capture_records, '.pcapng': _capture_records}
+    '.blf': partial(_entries, read_blf), '.db': _database_records,
+    '.mf4': partial(_entries, read_measured),
+    **dict.fromkeys(('.pcap', '.pcapng'), partial(_entries, read_capture))}
 
 
 def _kind_by_length(data: bytes) -> RecordKind:

@@ -119,15 +119,15 @@ def _group(measured: Any, number: int, kind: str, begin: float, count: int,
                                   raw=False)
             samples, times = signal.samples, signal.timestamps.tolist()
             prefix = f'{kind}.'
-            members = {name.removeprefix(prefix): samples[name]
-                       for name in samples.dtype.names or ()}
+            members = _Members({name.removeprefix(prefix): samples[name]
+                                for name in samples.dtype.names or ()})
         except Exception:  # noqa: BLE001  whatever damaged data make it raise
             complain(command_sentences.trace_cut())
             return
-        build = _BUILDERS[kind](members)
+        build = _BUILDERS[kind]
         for place, time in enumerate(times):
             try:
-                record = build(place, begin + time)
+                record = build(members, place, begin + time)
             except (ValueError, TypeError, IndexError, OverflowError, AttributeError):
                 complain(f'no entry of {kind}')
                 continue
@@ -176,43 +176,30 @@ class _Members:
         return bool(int(value))
 
 
-def _data(members: dict[str, Any]) -> Callable[[int, float], Record]:
-    known = _Members(members)
-
-    def build(place: int, time: float) -> Record:
-        identifier, extended = known.identifier(place)
-        data = known.data(place)
-        is_fd = known.number('EDL', place) or len(data) > _CLASSICAL_MAX
-        return Record(time, known.channel(place), identifier, data, extended,
-                      RecordKind.FD if is_fd else DATA, known.sent(place))
-    return build
+def _data(known: _Members, place: int, time: float) -> Record:
+    identifier, extended = known.identifier(place)
+    data = known.data(place)
+    is_fd = known.number('EDL', place) or len(data) > _CLASSICAL_MAX
+    return Record(time, known.channel(place), identifier, data, extended,
+                  RecordKind.FD if is_fd else DATA, known.sent(place))
 
 
-def _remote(members: dict[str, Any]) -> Callable[[int, float], Record]:
-    known = _Members(members)
-
-    def build(place: int, time: float) -> Record:
-        identifier, extended = known.identifier(place)
-        return Record(time, known.channel(place), identifier, b'', extended, RecordKind.REMOTE,
-                      known.sent(place))
-    return build
+def _remote(known: _Members, place: int, time: float) -> Record:
+    identifier, extended = known.identifier(place)
+    return Record(time, known.channel(place), identifier, b'', extended, RecordKind.REMOTE,
+                  known.sent(place))
 
 
-def _error(members: dict[str, Any]) -> Callable[[int, float], Record]:
-    known = _Members(members)
-    of_python_can = known.names == _OF_PYTHON_CAN
-
-    def build(place: int, time: float) -> Record:
-        channel = known.channel(place)
-        identifier, extended = known.identifier(place)
-        data, sent = known.data(place), known.sent(place)
-        if of_python_can:
-            return Record(time, channel, identifier, data, extended, RecordKind.ERROR, sent)
-        if identifier or data:
-            return Record(time, channel, identifier, data, extended, RecordKind.DESTROYED, sent)
-        classes, details = _ERROR_TYPES.get(known.number('ErrorType', place), (0, b''))
-        return Record(time, channel, classes, details, False, RecordKind.ERROR, sent)
-    return build
+def _error(known: _Members, place: int, time: float) -> Record:
+    channel = known.channel(place)
+    identifier, extended = known.identifier(place)
+    data, sent = known.data(place), known.sent(place)
+    if known.names == _OF_PYTHON_CAN:
+        return Record(time, channel, identifier, data, extended, RecordKind.ERROR, sent)
+    if identifier or data:
+        return Record(time, channel, identifier, data, extended, RecordKind.DESTROYED, sent)
+    classes, details = _ERROR_TYPES.get(known.number('ErrorType', place), (0, b''))
+    return Record(time, channel, classes, details, False, RecordKind.ERROR, sent)
 
 
 _BUILDERS = {'CAN_DataFrame': _data, 'CAN_RemoteFrame': _remote, 'CAN_ErrorFrame': _error}

@@ -19,12 +19,12 @@ import can
 import can.interfaces
 
 from drive_can_bridge.core import complaints
-from drive_can_bridge.core.adapter import AdapterTraits
 from drive_can_bridge.core.complaints import suggestion
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.transport.bus_identity import identity_of, SERIAL_INTERFACES
-from drive_can_bridge.transport.known_adapters import BY_NAME, traits_of, what_helps
+from drive_can_bridge.transport.known_adapters import (
+    BY_NAME, traits_of as traits_of, what_helps)
 
 #: how a channel begins that pyserial opens, but is no device here; others may write files
 _REMOTE = ('socket://', 'rfc2217://')
@@ -127,10 +127,6 @@ def check_name(interface: str, name: str) -> Sentence | None:
         return complaints.adapter_of_other_interface(name=name, other=row.interface)
     return None
 
-
-def traits(bus: BusConfiguration) -> AdapterTraits | None:
-    """Return what is known of the adapter of a bus; None: nothing."""
-    return traits_of(bus)
 
 
 def serial_port(bus: BusConfiguration) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ They fail in many ways: NameError, NotImplementedError, OSError, ValueError, Can
 children, whatever a vendor's library raises.
 """
 
+from collections.abc import Iterator
 import errno
 import struct
 
@@ -51,21 +52,20 @@ def is_malformed(error: BaseException) -> bool:
 
 def is_misconfiguration(error: BaseException) -> bool:
     """Return whether another attempt to open a bus would fail for the same reason."""
-    # python-can wraps errors; the reason is at the end of the chain
-    cause: BaseException | None = error
-    while cause is not None:
+    for cause in _chain(error):
         if isinstance(cause, OSError):
             return _is_missing_library(cause)
         if isinstance(cause, (NotImplementedError, ImportError, NameError, ValueError,
                               TypeError)):
             return True
-        cause = cause.__cause__
     return False
 
 
-def is_undefined(error: BaseException) -> bool:
-    """Return whether an adapter uses a vendor's library that it has not found, and went on."""
-    return type(error) is NameError
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    """Yield an error and its causes: python-can wraps errors, the reason is at the end."""
+    while error is not None:
+        yield error
+        error = error.__cause__
 
 
 def _is_missing_library(error: OSError) -> bool:
@@ -77,12 +77,8 @@ def _is_missing_library(error: OSError) -> bool:
 
 def is_absence(error: BaseException) -> bool:
     """Return whether a device could not be opened because it is not there."""
-    cause: BaseException | None = error
-    while cause is not None:
-        if getattr(cause, 'errno', None) in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
-            return True
-        cause = cause.__cause__
-    return False
+    return any(getattr(cause, 'errno', None) in (errno.ENOENT, errno.ENODEV, errno.ENXIO)
+               for cause in _chain(error))
 
 
 def is_full_queue(error: BaseException) -> bool:

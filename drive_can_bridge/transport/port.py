@@ -33,8 +33,7 @@ from drive_can_bridge.transport.error_frames import (
     ADVICE_ALONE, ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame,
 )
 from drive_can_bridge.transport.failures import (
-    in_words, is_absence, is_full_queue, is_malformed, is_misconfiguration, is_undefined,
-    with_cause,
+    in_words, is_absence, is_full_queue, is_malformed, is_misconfiguration, with_cause,
 )
 from drive_can_bridge.transport.foreign_clock import ForeignClock
 from drive_can_bridge.transport.gateway import Gateway
@@ -435,7 +434,9 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
             options['bitrate'] = bus.bitrate
         opened: can.BusABC
         if bus.interface in SERIAL_INTERFACES:
-            opened = _open_serial(adapter, bus, clock, lock, options)
+            adapter = watched(adapter, bus.interface, _PORTS[bus.interface], clock.now,
+                              lock.keep_out if lock is not None else lambda: None)
+            opened = adapter(bus.channel, **options)
         elif bus.interface == 'socketcand':
             opened = Gateway(str(bus.channel), now=clock.now, **options)
         else:
@@ -447,7 +448,7 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
     except Exception as error:  # the one place where adapters may throw anything
         _abandon(error)
         reason = in_words(error)
-        if is_undefined(error):
+        if type(error) is NameError:    # it uses a library that it has not found, and went on
             reason = complaints.driver_missing(
                 interface=bus.interface, why=reason, helps=what_helps(bus.interface))
         text: str = around(reason, f'{where}: ')
@@ -470,13 +471,6 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
         raise BusUnavailable(why or around(in_words(error), f'{where}: ')) from error
     return port
 
-
-def _open_serial(adapter: type[Any], bus: BusConfiguration, clock: Clock,
-                 lock: DeviceLock | None, options: dict[str, Any]) -> can.BusABC:
-    adapter = watched(adapter, bus.interface, _PORTS[bus.interface], clock.now,
-                      lock.keep_out if lock is not None else lambda: None)
-    opened: can.BusABC = adapter(bus.channel, **options)
-    return opened
 
 
 def _check_carrier(channel: str) -> None:

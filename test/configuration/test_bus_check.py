@@ -121,7 +121,7 @@ class Adapters:
     def check_name(self, interface: str, name: str) -> Sentence | None:
         return None
 
-    def traits(self, bus: BusConfiguration) -> AdapterTraits | None:
+    def traits_of(self, bus: BusConfiguration) -> AdapterTraits | None:
         return None
 
 
