@@ -85,11 +85,16 @@ class ExtendedDrive:
     def __init__(self, registers: dict[int, int]) -> None:
         self.registers = registers
 
+    @staticmethod
+    def in_cycle(sent: Frame) -> bool:
+        """Return whether a frame is of the cyclic exchange."""
+        return sent.identifier & 0x1FFFF0 == 0x1FFFF0
+
     def takes(self, sent: Frame) -> list[Frame]:
         identifier, data, _ = sent
         number, count = identifier >> 4 & 0xFFFF, identifier & 0xF
         words = [int.from_bytes(data[place:place + 2], 'big') for place in range(0, 8, 2)]
-        if identifier & 0x1FFFF0 == 0x1FFFF0:
+        if self.in_cycle(sent):
             self.registers.update(zip(self._mapped(122), words))
             numbers = self._mapped(126)
         elif identifier & 0x100000:
@@ -112,6 +117,11 @@ class StandardDrive:
 
     def __init__(self, registers: dict[int, int]) -> None:
         self.registers = registers
+
+    @staticmethod
+    def in_cycle(_: Frame) -> bool:
+        """Return True: cycles and requests go by the same frames."""
+        return True
 
     def takes(self, sent: Frame) -> list[Frame]:
         data = sent.data
@@ -140,9 +150,13 @@ class CannordDrive:
         self.registers, self.alone = motor, 2 * station
         self.obeys: tuple[int, ...] = (self.alone, *broadcasts)
 
+    def in_cycle(self, sent: Frame) -> bool:
+        """Return whether a frame is of the cyclic exchange."""
+        return sent.identifier != 0x200 + self.alone
+
     def takes(self, sent: Frame) -> list[Frame]:
         identifier, data, _ = sent
-        if identifier == 0x200 + self.alone:
+        if not self.in_cycle(sent):
             return self._parameter(data)
         if identifier not in self.obeys:
             return []
@@ -179,6 +193,11 @@ class PkwNode:
         self.operational = False
         self.function = 0
         self.executed: list[tuple[int, tuple[int, ...]]] = []
+
+    @staticmethod
+    def in_cycle(_: Frame) -> bool:
+        """Return True: cycles and requests go by the same frames."""
+        return True
 
     def takes(self, sent: Frame) -> list[Frame]:
         data = sent.data
@@ -263,6 +282,10 @@ class ServoDrive:
         self.objects.update(objects or {})
         self._initial = dict(self.objects)
 
+    def in_cycle(self, sent: Frame) -> bool:
+        """Return whether a frame is no SDO."""
+        return sent.identifier != 0x600 + self.node
+
     def number(self, index: int, subindex: int = 0) -> int:
         return int.from_bytes(self.objects[index, subindex], 'little')
 
@@ -274,7 +297,7 @@ class ServoDrive:
             return []
         if identifier == 0x80:
             return self._sync()
-        if identifier == 0x600 + self.node:
+        if not self.in_cycle(sent):
             return [] if data[0] == 0x80 else [Frame(0x580 + self.node, self._sdo(data), False)]
         if self.operational:
             for pdo in range(4):
@@ -289,6 +312,8 @@ class ServoDrive:
         if command in (0x81, 0x82):
             return self.restarts()
         self.operational, self.stopped = command == 0x01, command == 0x02
+        if not self.operational:
+            self._staged.clear()    # as stacks do
         return []
 
     def beats(self) -> Frame:

@@ -47,7 +47,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.families import make_sessions
 
 #: s until a frame is answered, and by a drive that is late
-PROMPT, LATE = 0.002, 1.4 * PERIOD
+PROMPT, LATE, SLOW = 0.002, 1.4 * PERIOD, 0.27
 #: s that a drive is talked to until it has to stand
 STOPPED_AFTER = 3.0
 #: stories that are told of each kind before the next has its turn
@@ -63,7 +63,8 @@ RAW, VALUE, COMMANDED_EVERY = 50, 5.0, 0.1
 #: what may happen, and how many s pass then
 THINGS = ('run', 'enable', 'zero', 'quiet', 'disable', 'quick_stop', 'silent', 'mute', 'late',
           'twice', 'well', 'power', 'stall', 'late process', 'bus down', 'bus up', 'refuses',
-          'maps', 'response map', 'maps right', 'nmt stop', 'end', 'begin')
+          'maps', 'response map', 'maps right', 'nmt stop', 'end', 'begin', 'slow', 'lossy',
+          'cycles lost', 'requests lost', 'trips', 'reset', 'nmt start')
 PAUSES = (0.013, 0.9)
 Story = tuple[tuple[str, float], ...]
 
@@ -84,6 +85,7 @@ class Partner:
     unwanted_since: float = math.inf
     said: bool = False              # that it may still be running, since it was found
     unseen_until: float = -math.inf     # a restart
+    boot_up_lost: bool = False
     left_over: bool = False         # it runs since an activation before, which ended with a word
     events: list[Any] = field(default_factory=list)
 
@@ -134,6 +136,8 @@ class World:
         self.leader = self.sessions[0]
         self.control = self.leader.control is not None
         self.deaf = self.mute = self.twice = self.refusing = False
+        self.lossy = self.cycles_lost = self.requests_lost = False
+        self.frames = 0     # both ways, while some are lost
         self.bus = self.active = True
         self.delay = PROMPT
         self.coming = Coming()
@@ -165,15 +169,24 @@ class World:
                 self.told(partner, event)
 
     def hear(self, sent: Frame) -> None:
+        lost = self.deaf or self.drops(2)
         if isinstance(self.partners[0].device, StandardDrive) and not self.control:
-            self.unheard.goes(sent, lost=self.deaf)
-        if self.deaf:
+            self.unheard.goes(sent, lost=lost)
+        if lost:
             return
         for partner in self.partners:
+            if self.cycles_lost if partner.device.in_cycle(sent) else self.requests_lost:
+                continue
             answers = partner.device.takes(sent)
             partner.motor.look()
             for answer in () if self.mute else answers * (1 + self.twice):
-                self.comes(self.now + self.delay, partner.index, answer)
+                if not self.drops(3):
+                    self.comes(self.now + self.delay, partner.index, answer)
+
+    def drops(self, share: int) -> bool:
+        """Return whether a frame is one of those that a bad line loses."""
+        self.frames += self.lossy
+        return self.lossy and self.frames % share == 0
 
     def comes(self, at: float, index: int, answer: Frame) -> None:
         """Have something arrive then, if the bus is there."""
@@ -195,7 +208,8 @@ class World:
             if not event.success:
                 self.ends()
         elif isinstance(event, ControlCompleted) and event.success and (
-                self.now >= self.looked_at):
+                self.now >= self.looked_at
+                and event.request.action is not ControlAction.RESET_FAULT):
             for each in self.partners:
                 if self.driven(each) and not (
                         each.wanted or each.left_over or self.now <= each.unseen_until
@@ -262,7 +276,8 @@ class World:
         return partner.motor.runs and (self.control or not partner.armed)
 
     def reachable(self) -> bool:
-        return self.bus and not (self.deaf or self.mute or self.refusing)
+        return self.bus and not (self.deaf or self.mute or self.refusing or self.lossy
+                                 or self.cycles_lost or self.requests_lost)
 
     def judge(self) -> None:
         """Judge motors that run although they shall not, and those that do not brake."""
@@ -312,7 +327,7 @@ class World:
             self.enabling = True
             for partner in self.partners:
                 partner.wanted = True
-        elif action is not ControlAction.QUICK_STOP or (
+        elif action is ControlAction.DISABLE or action is ControlAction.QUICK_STOP and (
                 session.control.table.quick_stop is not None):
             self.ends()
         session.services.submit(ControlRequest(action), self.now)
@@ -357,8 +372,32 @@ class World:
     def _twice(self) -> None:
         self.twice = True
 
+    def _slow(self) -> None:
+        self.delay = SLOW
+
+    def _lossy(self) -> None:
+        self.lossy = True
+
+    def _cycles_lost(self) -> None:
+        self.cycles_lost = True
+
+    def _requests_lost(self) -> None:
+        self.requests_lost = True
+
+    def _trips(self) -> None:
+        """Stop by a fault of their own; of one without a word nobody can tell when it ended."""
+        if self.control:
+            for partner in self.partners:
+                partner.motor.stops(faulty=True)
+            if not self.enabling:
+                self.ends()
+
+    def _reset(self) -> None:
+        self._ask(ControlAction.RESET_FAULT)
+
     def _well(self) -> None:
         self.deaf = self.mute = self.twice = self.refusing = False
+        self.lossy = self.cycles_lost = self.requests_lost = False
         self.delay = PROMPT
 
     def _power(self) -> None:
@@ -372,7 +411,8 @@ class World:
         for partner in self.partners:
             if isinstance(partner.device, (PkwNode, ServoDrive)):
                 partner.device.restarts()
-                if not self.mute and not self.deaf and self.bus:
+                partner.boot_up_lost = self.mute or self.deaf or not self.bus
+                if not partner.boot_up_lost:
                     self.comes(self.now + 0.001, partner.index,
                                frame(f'{0x700 + partner.device.node:03X}#00'))
 
@@ -427,9 +467,17 @@ class World:
 
     def _nmt_stop(self) -> None:
         """Have another master stop the nodes by NMT: they hear no PDO and no SDO, and run on."""
+        self.commanded_by_nmt(2)
+
+    def _nmt_start(self) -> None:
+        """Have it start them, but for those of whose restart nobody can know then."""
+        self.commanded_by_nmt(1)
+
+    def commanded_by_nmt(self, command: int) -> None:
         for partner in self.partners:
-            if isinstance(partner.device, (PkwNode, ServoDrive)):
-                partner.device.takes(Frame(0, bytes((2, partner.device.node)), False))
+            if isinstance(partner.device, (PkwNode, ServoDrive)) and not (
+                    command == 1 and partner.boot_up_lost):
+                partner.device.takes(Frame(0, bytes((command, partner.device.node)), False))
 
     def _maps(self) -> None:
         """Have somebody change the request map: what was the setpoint is nothing any more."""

@@ -188,6 +188,9 @@ class BringUp:
             yield Transfer(pause=LOOK_PERIOD)
             reply = yield from self._transfer(Transfer(states.STATUS_WORD))
         self._found = NOTHING
+        if state in states.ONE_WORD_FROM_ENABLED and self._beat is not None:
+            # a SYNC may put into effect a 000Fh that the drive still has in its buffers
+            yield from self._put(states.CONTROL_WORD, 0, states.DISABLE_VOLTAGE, 2)
         self.moving, self._disabled = None, True
         self._rules.known_disabled()
         self._session.duty.happened(Happened.STOPPED)

@@ -97,6 +97,8 @@ PATTERNS = {
 }
 #: in which a motor has current, and may move
 MOVING = (ServoState.OPERATION_ENABLED, ServoState.QUICK_STOP_ACTIVE, ServoState.FAULT_REACTION)
+#: in which 000Fh alone starts the motor: many drives go on from *ready to switch on* by themselves
+ONE_WORD_FROM_ENABLED = (ServoState.READY_TO_SWITCH_ON, ServoState.SWITCHED_ON)
 _MASK = 0x006F
 #: of all combinations of the bits that states are told by
 _STATES = {raw: next((state for state, (mask, value) in PATTERNS.items()

@@ -3,6 +3,7 @@
 
 from typing import Any
 
+from drives import ServoDrive
 import pytest
 from saying import says
 from servo_builders import Axis
@@ -185,6 +186,30 @@ class TestBeforeTheFirst:
         axis = Axis('pv')
         axis.deaf = axis.mute = True
         assert self.first(axis) == -1.0
+
+    @pytest.mark.parametrize('mapping', ['configure', 'verify', 'assume'])
+    @pytest.mark.parametrize('state', [
+        ServoDrive.ENABLED, ServoDrive.ON, ServoDrive.READY, ServoDrive.OFF])
+    def test_one_that_has_yet_to_obey_a_bridge_that_died(self, state: int, mapping: str) -> None:
+        """The RPDO came, and its SYNC did not: 000Fh, by which many go on from ready as well."""
+        before = Axis('pv').enabled()
+        before.commands(0.0, 100.0)
+        before.live(0.05)
+        drive = before.drive
+        before.deliver([text for text in sent(before) if text.startswith('205#0F00')][-1:])
+        drive.becomes(state)
+        after = Axis('pv', mapping=mapping)
+        after.drive = drive
+        became = []
+        becomes = drive.becomes
+
+        def records(to: int) -> None:
+            became.append(to)
+            becomes(to)
+        drive.becomes = records     # type: ignore[method-assign]
+        self.first(after)
+        assert after.session.online
+        assert drive.ENABLED not in became
 
     @pytest.mark.parametrize('instead', [{'404160': '8041600022000008'}, {}])
     def test_one_that_beats_and_does_not_say_it(self, instead: dict[str, str]) -> None:
