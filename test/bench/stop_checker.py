@@ -118,8 +118,9 @@ class World:
     """
     Sessions of a kind, their drives, their users and their bus.
 
-    :param lenient: what nobody can see is forgiven: short restarts, and maps that somebody has
-        rewritten since they were looked at last.
+    :param lenient: what nobody can see is forgiven: short restarts, maps that somebody has
+        rewritten since they were looked at last, and an RPDO whose SYNC was lost, as all RPDOs
+        behind it were. It is to be stopped again, as whatever runs.
     """
 
     def __init__(self, kind: str, *, lenient: bool = True) -> None:
@@ -138,6 +139,7 @@ class World:
         self.deaf = self.mute = self.twice = self.refusing = False
         self.lossy = self.cycles_lost = self.requests_lost = False
         self.frames = 0     # both ways, while some are lost
+        self.sync_lost = False      # none was heard since
         self.bus = self.active = True
         self.delay = PROMPT
         self.coming = Coming()
@@ -170,10 +172,17 @@ class World:
 
     def hear(self, sent: Frame) -> None:
         lost = self.deaf or self.drops(2)
+        sync = sent.identifier == 0x80 and isinstance(self.partners[0].device, ServoDrive)
+        self.sync_lost = self.sync_lost or sync and (lost or self.cycles_lost)
         if isinstance(self.partners[0].device, StandardDrive) and not self.control:
             self.unheard.goes(sent, lost=lost)
         if lost:
             return
+        self.hears(sent)
+        self.sync_lost = self.sync_lost and not (sync and not self.cycles_lost)
+
+    def hears(self, sent: Frame) -> None:
+        """Have the drives answer."""
         for partner in self.partners:
             if self.cycles_lost if partner.device.in_cycle(sent) else self.requests_lost:
                 continue
@@ -262,6 +271,8 @@ class World:
         partner = self.partners[index]
         if self.now < self.looked_at or self.now <= partner.unseen_until:
             partner.wanted = partner.armed = True   # as far as anybody but the drive can know
+            return
+        if self.lenient and self.sync_lost:     # and nothing that was sent since was heard
             return
         if self.control and not partner.wanted:
             raise Violation(f'drive {index + 1} starts by itself')
