@@ -106,6 +106,11 @@ class Conversation:
         self.session.activate(now)
         return self.sent()
 
+    def begins(self, now: float = 10.0) -> list[str]:
+        """Be activated, on a bus that has been there for a second."""
+        assert self.bus_up(now - 1.0) == []
+        return self.activate(now)
+
     def deactivate(self, now: float) -> list[str]:
         self.now = now
         self.session.deactivate(now)

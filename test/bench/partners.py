@@ -106,10 +106,11 @@ class Partner(ABC):
         self.deliver(self.talk.submits(
             write(*((self.own(parameter), raw) for parameter, raw in items)), self.now))
 
-    def start(self) -> None:
+    def start(self) -> 'Partner':
         self.deliver(self.talk.bus_up(self.now))
         self.deliver(self.talk.activate(self.now))
         self.live(0.2)
+        return self
 
     def take(self) -> list[tuple[float, str]]:
         """Return the frames sent since the last call."""

@@ -90,7 +90,7 @@ class Bus:
         for session in self.sessions:
             session.handle_timer(self.now)
 
-    def run(self) -> None:
+    def run(self) -> 'Bus':
         leader = self.sessions[0]
         assert all(session.online for session in self.sessions)
         if leader.control is not None:
@@ -101,6 +101,7 @@ class Bus:
             leader.services.command(0, value, self.now)
             self.live(max(0.15, 1.1 * leader.configuration.period))
         assert all(device.registers.runs for device in self.devices)
+        return self
 
     def run_on(self, seconds: float) -> None:
         """Go on with commands, which grow old."""
@@ -139,8 +140,7 @@ BEHIND = some([(kind, *lag) for kind in KINDS for lag in (*LAGS, *LONG_LAGS)
 def test_a_drive_that_is_deaf_from_the_stop_on_is_named(
         kind: str, period: float, delay: float) -> None:
     for place in some(range(5), 5):
-        bus = Bus(kind, period, delay)
-        bus.run()
+        bus = Bus(kind, period, delay).run()
         bus.live(0.2 * place * period)
         bus.deaf = set(range(len(bus.devices)))
         assert bus.stop() == [True] * len(bus.devices)
@@ -149,8 +149,7 @@ def test_a_drive_that_is_deaf_from_the_stop_on_is_named(
 @pytest.mark.parametrize(('kind', 'period', 'delay'), BEHIND)
 def test_a_drive_that_heard_the_stop_is_not(kind: str, period: float, delay: float) -> None:
     for place in some(range(5), 5):
-        bus = Bus(kind, period, delay)
-        bus.run()
+        bus = Bus(kind, period, delay).run()
         bus.live(0.2 * place * period)
         assert bus.stop() == [False] * len(bus.devices)
         assert not any(told_to_run(device) for device in bus.devices)
@@ -160,8 +159,7 @@ def test_a_drive_that_heard_the_stop_is_not(kind: str, period: float, delay: flo
 @pytest.mark.parametrize('kind', KINDS)
 def test_answers_that_come_twice_show_no_stop(kind: str, lag: float) -> None:
     """A gateway doubles frames: what seems to answer the stop answers a cycle before it."""
-    bus = Bus(kind, 0.02, lag * 0.02)
-    bus.run()
+    bus = Bus(kind, 0.02, lag * 0.02).run()
     bus.copies = 2
     bus.run_on(0.9)
     assert all(device.registers.runs for device in bus.devices)
@@ -172,8 +170,7 @@ def test_answers_that_come_twice_show_no_stop(kind: str, lag: float) -> None:
 
 @pytest.mark.parametrize('kind', [kind for kind in KINDS if 'word' not in kind or 'slot' in kind])
 def test_a_stop_of_a_user_is_answered_though_answers_come_twice(kind: str) -> None:
-    bus = Bus(kind, 0.02, 0.002)
-    bus.run()
+    bus = Bus(kind, 0.02, 0.002).run()
     bus.copies = 2
     bus.run_on(0.9)
     leader = bus.sessions[0]
@@ -211,8 +208,7 @@ def test_what_was_lost_before_is_no_doubt(kind: str, lost: int, silence: float) 
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_a_drive_that_misses_three_cycles_of_its_stop_gets_more(kind: str) -> None:
-    bus = Bus(kind, 0.02, 0.002)
-    bus.run()
+    bus = Bus(kind, 0.02, 0.002).run()
     everybody = set(range(len(bus.devices)))
     bus.deaf = everybody
     begun = bus.now
@@ -233,8 +229,7 @@ def test_a_drive_that_misses_three_cycles_of_its_stop_gets_more(kind: str) -> No
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_one_that_hears_nothing_gets_up_to_three_more(kind: str) -> None:
-    bus = Bus(kind, 0.02, 0.002)
-    bus.run()
+    bus = Bus(kind, 0.02, 0.002).run()
     bus.deaf = set(range(len(bus.devices)))
     bus.sent.clear()
     bus.stop()
@@ -247,8 +242,7 @@ def test_one_that_hears_nothing_gets_up_to_three_more(kind: str) -> None:
 @pytest.mark.parametrize('members', [2, 4])
 def test_members_that_did_not_answer_get_frames_of_their_own(members: int) -> None:
     """Two are deaf to broadcasts and to three cycles of the stop."""
-    bus = Bus(f'CANnord, group of {"two" if members == 2 else "four"}', 0.02, 0.002)
-    bus.run()
+    bus = Bus(f'CANnord, group of {"two" if members == 2 else "four"}', 0.02, 0.002).run()
     deaf = {0, members - 1}
     bus.deaf = set(deaf)
     for session in bus.sessions:
@@ -294,8 +288,7 @@ def test_members_that_a_broadcast_alone_started_are_named(refused: str) -> None:
 @pytest.mark.parametrize('members', ['two', 'four'])
 def test_a_group_whose_answers_take_longer_than_a_period_comes_online(
         members: str, delay: float) -> None:
-    bus = Bus(f'CANnord, group of {members}', 0.02, delay)
-    bus.run()
+    bus = Bus(f'CANnord, group of {members}', 0.02, delay).run()
     assert not any(isinstance(event, FrameRejected)
                    for events in bus.events for event in events)
 
@@ -315,8 +308,7 @@ ALONE = [kind for kind in KINDS if 'group' not in kind]
 def test_what_was_held_until_a_stop_does_not_show_it(
         kind: str, period: float, limit: int, held: float, longer: float) -> None:
     for place in some(range(5), 5):
-        bus = Bus(kind, period, 0.002, limit)
-        bus.run()
+        bus = Bus(kind, period, 0.002, limit).run()
         bus.run_on(0.2 * place * period)
         bus.held_until = bus.now + held + longer
         bus.run_on(held)
@@ -328,8 +320,7 @@ def test_what_was_held_until_a_stop_does_not_show_it(
 @pytest.mark.parametrize(('held', 'longer'), [(0.25, 0.15), (0.65, 0.3), (1.5, 0.8), (1.5, 1.2)])
 def test_what_was_held_until_a_quick_stop_does_not_show_it(held: float, longer: float) -> None:
     for place in some(range(5), 5):
-        bus = Bus('29 bit, no word, maps assumed', 0.1, 0.002, 30)
-        bus.run()
+        bus = Bus('29 bit, no word, maps assumed', 0.1, 0.002, 30).run()
         bus.run_on(0.02 * place)
         bus.held_until = bus.now + held + longer
         bus.run_on(held)
@@ -348,8 +339,7 @@ def test_what_was_held_until_a_quick_stop_does_not_show_it(held: float, longer: 
 def test_what_was_lost_until_a_stop_is_no_doubt(
         kind: str, period: float, limit: int, lost: int) -> None:
     for place in some(range(5), 5):
-        bus = Bus(kind, period, 0.002, limit)
-        bus.run()
+        bus = Bus(kind, period, 0.002, limit).run()
         bus.run_on(0.2 * place * period)
         bus.lose = 1000
         bus.run_on(lost * period)
@@ -362,8 +352,7 @@ def test_what_was_lost_until_a_stop_is_no_doubt(
 def test_what_was_lost_until_a_quick_stop_is_no_doubt(
         period: float, limit: int, lost: int) -> None:
     for place in some(range(5), 5):
-        bus = Bus('29 bit, no word, maps assumed', period, 0.002, limit)
-        bus.run()
+        bus = Bus('29 bit, no word, maps assumed', period, 0.002, limit).run()
         bus.run_on(0.2 * place * period)
         bus.lose = 1000
         bus.run_on(lost * period)

@@ -35,8 +35,7 @@ def _make(request: pytest.FixtureRequest) -> type[Partner]:
 
 @pytest.fixture(name='partner')
 def _partner(make: type[Partner]) -> Partner:
-    partner = make()
-    partner.start()
+    partner = make().start()
     assert partner.talk.session.online
     partner.enable()
     partner.take()
@@ -68,8 +67,7 @@ def test_nothing_before_the_bus_is_there(make: type[Partner]) -> None:
 
 
 def test_online_is_told_before_the_first_sample(make: type[Partner]) -> None:
-    partner = make()
-    partner.start()
+    partner = make().start()
     events = partner.talk.events(StationFound, StationLost, ProcessDataReceived)
     assert events[0] == StationFound()
     assert {event.raws for event in events[1:]} == {partner.sample}
@@ -218,8 +216,7 @@ def test_a_stop_that_the_drive_did_not_hear_is_told(partner: Partner) -> None:
 
 def test_a_drive_that_is_silent_when_the_bridge_ends_is_told(make: type[Partner]) -> None:
     """It does not count as lost yet."""
-    partner = make(missed_limit=100)
-    partner.start()
+    partner = make(missed_limit=100).start()
     partner.enable()
     run(partner)
     partner.mute = True
@@ -257,8 +254,7 @@ def test_nobody_is_warned_of_a_drive_that_was_never_told_to_run(partner: Partner
 
 
 def test_acknowledged_or_not_a_refused_write_is_not_sent(make: type[Partner]) -> None:
-    partner = make(verify_writes=False)
-    partner.start()
+    partner = make(verify_writes=False).start()
     partner.talk.events()
     sent: list[str] = []
 
@@ -290,8 +286,7 @@ def test_life_can_be_repeated(partner: Partner) -> None:
 
 
 def test_nothing_moves_before_it_is_enabled(make: type[Partner]) -> None:
-    partner = make(rearm_immediate=True)
-    partner.start()
+    partner = make(rearm_immediate=True).start()
     assert partner.talk.session.state is partner.idle
     if partner.idle is DriveState.DISABLED:
         assert partner.talk.commands(0, 100.0, partner.now) is CommandOutcome.DISABLED
@@ -313,8 +308,7 @@ def test_only_neutral_until_armed(partner: Partner) -> None:
 
 
 def test_immediate(make: type[Partner]) -> None:
-    partner = make(rearm_immediate=True)
-    partner.start()
+    partner = make(rearm_immediate=True).start()
     partner.enable()
     assert partner.talk.commands(0, -100.0, partner.now) is CommandOutcome.ARMED
     partner.live(0.1)
@@ -333,8 +327,7 @@ def test_silence_of_the_commander_is_neutral(partner: Partner) -> None:
 
 def test_that_waits_for_no_cycle(make: type[Partner]) -> None:
     """However long the period is; one of the last command may come between."""
-    partner = make(period=1.0, command_timeout=0.3)
-    partner.start()
+    partner = make(period=1.0, command_timeout=0.3).start()
     partner.live(3.0)
     partner.enable()
     partner.talk.commands(0, 0.0, partner.now)

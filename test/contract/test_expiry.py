@@ -28,8 +28,7 @@ def inverter(count: int, delay: float, **options: Any) -> Timeline:
         return delay, f'003#{status}{"0000" * count}'
 
     line = Timeline(talk, answer)
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     line.plan(10.15, partial(talk.asks, ControlAction.ENABLE))
     line.live(10.45)
     assert talk.session.online

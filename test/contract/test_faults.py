@@ -61,8 +61,7 @@ def text(partner: Partner) -> str:
 
 
 def test_an_error_code_of_cia402_is_told_as_manuals_write_it() -> None:
-    partner = PARTNERS['cia402']()
-    partner.start()
+    partner = PARTNERS['cia402']().start()
     session = partner.talk.session
     session.configuration = replace(session.configuration, profile=replace(
         session.configuration.profile, parameters={'fault_code': replace(

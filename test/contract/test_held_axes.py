@@ -41,8 +41,7 @@ def standard(**options: Any) -> Conversation:
     talk = Conversation(drive('datamodel_standard', **{
         'table': (*TABLE, setpoint, actual), 'control': CONTROL, 'request': (WORD, setpoint),
         'response': (STATUS, actual), **options}))
-    assert talk.bus_up(9.0) == []
-    assert talk.activate(10.0) == []
+    assert talk.begins() == []
     assert talk.at(10.0) == [ASK]
     return talk
 
@@ -157,8 +156,7 @@ def cannord() -> Conversation:
     setpoint, actual = pair(None, None)
     talk = Conversation(drive('cannord', table=(setpoint, actual), request=(setpoint,),
                               response=(actual,)))
-    assert talk.bus_up(9.0) == []
-    assert talk.activate(10.0) == []
+    assert talk.begins() == []
     assert talk.at(10.0) == ['002#7E040000']        # 047Eh and raw 0
     return talk
 
@@ -223,8 +221,7 @@ def pkw(control: ControlTable | None = PKW_CONTROL, **options: Any) -> Conversat
         'canopen_pkw', station=5, table=(PKW_STATUS, PKW_WORD, setpoint, actual),
         control=control, request=(setpoint,), response=(PKW_STATUS, actual),
         parameter_timeout=0.5, **options))
-    assert talk.bus_up(9.0) == []
-    assert talk.activate(10.0) == ['000#0105']
+    assert talk.begins() == ['000#0105']
     assert talk.at(10.05) == ['505#0000000000000000']
     assert talk.hears('485#0000000000000000', 10.051) == ['505#C70100A600000000']
     return talk

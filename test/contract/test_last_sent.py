@@ -16,8 +16,7 @@ def _family(request: pytest.FixtureRequest) -> str:
 
 
 def started(family: str, **options: object) -> Partner:
-    partner = PARTNERS[family](command_timeout=0.0, **options)
-    partner.start()
+    partner = PARTNERS[family](command_timeout=0.0, **options).start()
     assert partner.talk.session.online
     return partner
 

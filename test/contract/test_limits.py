@@ -161,8 +161,7 @@ def test_a_drive_whose_maps_differ_is_stopped_without_it() -> None:
 
 
 def test_a_drive_with_nothing_but_a_limit_is_online_at_once() -> None:
-    partner = PARTNERS['datamodel_standard'](request=(TORQUE,))
-    partner.start()
+    partner = PARTNERS['datamodel_standard'](request=(TORQUE,)).start()
     assert partner.talk.session.state is DriveState.ONLINE
     partner.deliver(partner.talk.deactivate(partner.now))
     partner.live(1.0)

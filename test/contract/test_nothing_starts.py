@@ -111,8 +111,7 @@ class Story:
         self.deaf_until = self.mute_until = -math.inf
         self.lost_any = False
         self.online = False
-        self.talk.bus_up(9.0)
-        self.line.took(self.talk.activate(10.0))
+        self.line.took(self.talk.begins())
         self.passes(0.5)
         assert self.online, 'a drive that is there is found'
 

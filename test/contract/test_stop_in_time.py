@@ -47,8 +47,7 @@ def test_a_stop_that_does_not_take_ends_in_time(protocol: str, storage: Storage 
         answers: list[Frame] = device.takes(frame(text))
         return (delay, str(answers[0])) if answers else None
     line = Timeline(talk, answer)
-    talk.bus_up(9.0)
-    line.took(talk.activate(10.0))
+    line.took(talk.begins())
     line.live(10.5)
     for index in range(4):
         for value in (0.0, 5.0) if index < 2 else (0, 5):

@@ -53,6 +53,11 @@ def asked(control: ControlMachine, action: ControlAction, now: float) -> Control
     return request
 
 
+def asking(control: ControlMachine, action: ControlAction, now: float) -> ControlMachine:
+    control.request(ControlRequest(action), now)
+    return control
+
+
 def outcomes(control: ControlMachine) -> list[tuple[ControlAction, bool, str]]:
     return [(done.request.action, done.success, done.message)
             for done in control.take_completed()]
@@ -157,8 +162,7 @@ def test_nothing_is_unconfirmed_where_nothing_is_reported() -> None:
 
 def test_running_on_under_disable_is_told_once() -> None:
     """A ramp may take as long as a request; whoever runs on after that takes no notice."""
-    control = enabled()
-    control.request(ControlRequest(DISABLE), 1.0)
+    control = asking(enabled(), DISABLE, 1.0)
     for step in range(1, 21):
         cycle(control, ENABLED, 1.0 + 0.1 * step)
         assert control.disregard == ''
@@ -176,8 +180,7 @@ def test_running_on_under_disable_is_told_once() -> None:
 
 
 def test_a_long_ramp_is_nothing_to_tell() -> None:
-    control = enabled()
-    control.request(ControlRequest(DISABLE), 1.0)
+    control = asking(enabled(), DISABLE, 1.0)
     for step in range(19):
         cycle(control, ENABLED, 1.05 + 0.1 * step)
     cycle(control, READY, 2.98)
@@ -210,8 +213,7 @@ def test_a_quick_stop_that_nothing_can_confirm_is_not_unconfirmed() -> None:
 def test_a_new_word_and_a_loss_end_the_running_on() -> None:
     for end in (lambda control: control.request(ControlRequest(QUICK_STOP), 4.0),
                 lambda control: control.withdraw('gone', 4.0)):
-        control = enabled()
-        control.request(ControlRequest(DISABLE), 1.0)
+        control = asking(enabled(), DISABLE, 1.0)
         cycle(control, ENABLED, 1.1)
         cycle(control, ENABLED, 3.9)
         assert control.disregard
@@ -315,8 +317,7 @@ def test_what_is_so_already_succeeds_at_once(table: ControlTable, raw: int, acti
     (QUICK_STOP, [says('word_not_followed', word=STOP), says('now_disable')])])
 def test_stop_that_is_not_confirmed_fails_and_it_stays_disabled(stop: ControlAction,
                                                                 remarks: list[says]) -> None:
-    control = enabled()
-    control.request(ControlRequest(stop), 1.0)
+    control = asking(enabled(), stop, 1.0)
     cycle(control, ENABLED, 1.02)
     control.handle_timer(3.0)
     assert outcomes(control) == [(stop, False, says(
@@ -326,8 +327,7 @@ def test_stop_that_is_not_confirmed_fails_and_it_stays_disabled(stop: ControlAct
 
 @pytest.mark.parametrize('stop', [DISABLE, QUICK_STOP])
 def test_stop_ends_a_fault_reset(stop: ControlAction) -> None:
-    control = faulted()
-    control.request(ControlRequest(RESET_FAULT), 0.01)
+    control = asking(faulted(), RESET_FAULT, 0.01)
     cycle(control, FAULT, 0.02)
     assert control.word == RESET
     control.request(ControlRequest(stop), 0.03)
@@ -361,8 +361,7 @@ def test_enable_waits_for_ready_then_for_enabled() -> None:
 
 
 def test_status_from_before_the_disable_word_left_confirms_nothing() -> None:
-    control = machine()
-    control.request(ControlRequest(ENABLE), 0.0)
+    control = asking(machine(), ENABLE, 0.0)
     control.status_received(READY, 0.01)
     assert control.word == OFF
     control.word_sent(0.02)
@@ -384,8 +383,7 @@ def test_status_from_before_the_enable_word_left_confirms_nothing() -> None:
 
 
 def test_missing_status_word_confirms_nothing() -> None:
-    control = machine()
-    control.request(ControlRequest(ENABLE), 0.0)
+    control = asking(machine(), ENABLE, 0.0)
     assert cycle(control, None, 0.02) == OFF
     assert cycle(control, None, 0.04) == OFF
     assert control.word == OFF
@@ -397,16 +395,14 @@ def test_missing_status_word_confirms_nothing() -> None:
 
 
 def test_enable_without_a_ready_condition_still_sends_disable_first() -> None:
-    control = machine(NO_READY)
-    control.request(ControlRequest(ENABLE), 0.0)
+    control = asking(machine(NO_READY), ENABLE, 0.0)
     assert cycle(control, NOT_READY, 0.0) == OFF
     assert cycle(control, ENABLED, 0.02) == RUN
     assert outcomes(control) == [(ENABLE, True, 'enabled')]
 
 
 def test_enable_without_an_enabled_condition_succeeds_when_sent() -> None:
-    control = machine(ONLY_READY)
-    control.request(ControlRequest(ENABLE), 0.0)
+    control = asking(machine(ONLY_READY), ENABLE, 0.0)
     cycle(control, READY, 0.0)
     assert (control.word, control.state) == (RUN, 'unknown')
     control.word_sent(0.02)
@@ -418,8 +414,7 @@ def test_enable_without_an_enabled_condition_succeeds_when_sent() -> None:
 
 
 def test_enable_with_only_a_fault_condition_looks_for_a_fault_first() -> None:
-    control = machine(ONLY_FAULT)
-    control.request(ControlRequest(ENABLE), 0.0)
+    control = asking(machine(ONLY_FAULT), ENABLE, 0.0)
     control.word_sent(0.0)
     assert control.word == OFF
     control.status_received(READY, 0.01)
@@ -428,8 +423,7 @@ def test_enable_with_only_a_fault_condition_looks_for_a_fault_first() -> None:
 
 @pytest.mark.parametrize('table', [SILENT, BARE])
 def test_enable_without_any_status_succeeds_when_sent(table: ControlTable) -> None:
-    control = machine(table)
-    control.request(ControlRequest(ENABLE), 0.0)
+    control = asking(machine(table), ENABLE, 0.0)
     assert cycle(control, None, 0.0) == OFF
     assert control.take_completed() == []
     assert cycle(control, None, 0.02) == RUN
@@ -490,8 +484,7 @@ def test_enabled_under_the_disable_word_is_outdated_and_not_taken_for_success() 
 
 
 def test_enable_is_refused_while_faulted() -> None:
-    control = faulted()
-    control.request(ControlRequest(ENABLE), 1.0)
+    control = asking(faulted(), ENABLE, 1.0)
     assert outcomes(control) == [(ENABLE, False, says('reset_first'))]
     assert (control.word, control.pending) == (OFF, False)
 
@@ -507,8 +500,7 @@ def test_enable_is_refused_while_faulted() -> None:
 def test_enable_that_is_not_confirmed_is_withdrawn(
         steps: tuple[tuple[int | None, float], ...], state: str, status: says,
         remarks: list[says]) -> None:
-    control = machine()
-    control.request(ControlRequest(ENABLE), 0.0)
+    control = asking(machine(), ENABLE, 0.0)
     for raw, now in steps:
         cycle(control, raw, now)
     control.handle_timer(1.999)
@@ -547,8 +539,7 @@ def test_word_that_leaves_after_the_deadline_is_not_taken_for_the_next_one() -> 
 
 
 def test_request_after_the_deadline_does_not_find_the_old_one() -> None:
-    control = machine()
-    control.request(ControlRequest(ENABLE), 0.0)
+    control = asking(machine(), ENABLE, 0.0)
     control.request(ControlRequest(ENABLE), 2.5)
     assert [success for _, success, _ in outcomes(control)] == [False]
     assert control.due == 4.5
@@ -572,8 +563,7 @@ def test_second_enable_joins_the_first() -> None:
 
 @pytest.mark.parametrize('before', [(), ((READY, 0.02),)])
 def test_fault_while_enabling_ends_it(before: tuple[tuple[int, float], ...]) -> None:
-    control = machine()
-    control.request(ControlRequest(ENABLE), 0.0)
+    control = asking(machine(), ENABLE, 0.0)
     for raw, now in before:
         cycle(control, raw, now)
     control.status_received(FAULT, 0.03)
@@ -629,8 +619,7 @@ def test_enabled_drive_survives_a_missing_status_word() -> None:
 
 
 def test_dropping_out_needs_a_condition_for_enabled() -> None:
-    control = machine(ONLY_READY)
-    control.request(ControlRequest(ENABLE), 0.0)
+    control = asking(machine(ONLY_READY), ENABLE, 0.0)
     cycle(control, READY, 0.0)
     cycle(control, READY, 0.02)
     cycle(control, NOT_READY, 0.04)
@@ -640,8 +629,7 @@ def test_dropping_out_needs_a_condition_for_enabled() -> None:
 # -- disable --------------------------------------------------------------------------------------
 
 def test_disable_waits_until_not_enabled() -> None:
-    control = enabled()
-    control.request(ControlRequest(DISABLE), 1.0)
+    control = asking(enabled(), DISABLE, 1.0)
     assert control.word == OFF
     control.status_received(READY, 1.01)
     assert control.take_completed() == []
@@ -653,8 +641,7 @@ def test_disable_waits_until_not_enabled() -> None:
 
 
 def test_disable_without_a_status_succeeds_when_sent() -> None:
-    control = machine(BARE)
-    control.request(ControlRequest(DISABLE), 0.0)
+    control = asking(machine(BARE), DISABLE, 0.0)
     assert control.take_completed() == []
     control.word_sent(0.02)
     message = 'disable sent; the drive does not report its state'
@@ -663,8 +650,7 @@ def test_disable_without_a_status_succeeds_when_sent() -> None:
 
 @pytest.mark.parametrize('steps', [(), ((READY, 0.02),)])
 def test_disable_wins_over_enable(steps: tuple[tuple[int, float], ...]) -> None:
-    control = machine()
-    control.request(ControlRequest(ENABLE), 0.0)
+    control = asking(machine(), ENABLE, 0.0)
     for raw, now in steps:
         cycle(control, raw, now)
     control.request(ControlRequest(DISABLE), 0.1)
@@ -677,8 +663,7 @@ def test_disable_wins_over_enable(steps: tuple[tuple[int, float], ...]) -> None:
 
 
 def test_disable_wins_over_a_quick_stop() -> None:
-    control = enabled()
-    control.request(ControlRequest(QUICK_STOP), 1.0)
+    control = asking(enabled(), QUICK_STOP, 1.0)
     control.request(ControlRequest(DISABLE), 1.01)
     assert control.word == OFF
     assert outcomes(control) == [(QUICK_STOP, False, says('replaced', action='disable'))]
@@ -687,8 +672,7 @@ def test_disable_wins_over_a_quick_stop() -> None:
 # -- quick stop -----------------------------------------------------------------------------------
 
 def test_quick_stop_brakes_until_not_enabled_then_disables() -> None:
-    control = enabled()
-    control.request(ControlRequest(QUICK_STOP), 1.0)
+    control = asking(enabled(), QUICK_STOP, 1.0)
     assert control.word == STOP
     control.status_received(READY, 1.01)
     assert control.word == STOP
@@ -723,8 +707,7 @@ def test_quick_stop_before_the_enable_word_needs_no_braking() -> None:
 
 
 def test_quick_stop_of_a_drive_that_still_runs_under_disable_brakes() -> None:
-    control = enabled()
-    control.request(ControlRequest(DISABLE), 1.0)
+    control = asking(enabled(), DISABLE, 1.0)
     control.request(ControlRequest(QUICK_STOP), 1.01)
     assert control.word == STOP
     assert outcomes(control) == [(DISABLE, False, says('replaced', action='quick_stop'))]
@@ -735,8 +718,7 @@ def test_quick_stop_of_a_drive_that_still_runs_under_disable_brakes() -> None:
 
 
 def test_quick_stop_of_a_drive_nobody_knows_brakes() -> None:
-    control = machine()
-    control.request(ControlRequest(QUICK_STOP), 0.0)
+    control = asking(machine(), QUICK_STOP, 0.0)
     assert control.word == STOP
     cycle(control, READY, 0.02)
     assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
@@ -790,8 +772,7 @@ def test_disable_takes_the_place_of_a_quick_stop_that_goes_on() -> None:
 
 
 def test_fault_during_a_quick_stop_disables_and_the_stop_is_still_watched() -> None:
-    control = enabled()
-    control.request(ControlRequest(QUICK_STOP), 1.0)
+    control = asking(enabled(), QUICK_STOP, 1.0)
     cycle(control, FAULT | ENABLED, 1.02)
     assert (control.word, control.pending) == (OFF, True)
     cycle(control, FAULT, 1.04)
@@ -799,8 +780,7 @@ def test_fault_during_a_quick_stop_disables_and_the_stop_is_still_watched() -> N
 
 
 def test_second_quick_stop_joins_the_first() -> None:
-    control = enabled()
-    control.request(ControlRequest(QUICK_STOP), 1.0)
+    control = asking(enabled(), QUICK_STOP, 1.0)
     control.request(ControlRequest(QUICK_STOP), 1.5)
     assert control.due == 3.0
     cycle(control, READY, 1.52)
@@ -817,8 +797,7 @@ def test_quick_stop_of_a_faulted_drive_that_still_runs_is_a_disable() -> None:
 
 
 def test_quick_stop_without_a_word_disables_and_says_so() -> None:
-    control = enabled(replace(FULL, quick_stop=None))
-    control.request(ControlRequest(QUICK_STOP), 1.0)
+    control = asking(enabled(replace(FULL, quick_stop=None)), QUICK_STOP, 1.0)
     assert (control.word, control.pending, control.operating) == (OFF, True, False)
     assert cycle(control, ENABLED, 1.02) == OFF
     assert outcomes(control) == []
@@ -828,8 +807,7 @@ def test_quick_stop_without_a_word_disables_and_says_so() -> None:
 
 
 def test_it_joins_a_disable() -> None:
-    control = enabled(replace(FULL, quick_stop=None))
-    control.request(ControlRequest(DISABLE), 1.0)
+    control = asking(enabled(replace(FULL, quick_stop=None)), DISABLE, 1.0)
     control.request(ControlRequest(QUICK_STOP), 1.01)
     cycle(control, ENABLED, 1.02)
     cycle(control, READY, 1.04)
@@ -838,8 +816,7 @@ def test_it_joins_a_disable() -> None:
 
 
 def test_quick_stop_without_a_status_is_answered_when_sent_and_keeps_braking() -> None:
-    control = machine(SILENT)
-    control.request(ControlRequest(ENABLE), 0.0)
+    control = asking(machine(SILENT), ENABLE, 0.0)
     cycle(control, None, 0.0)
     cycle(control, None, 0.02)
     control.take_completed()
@@ -870,8 +847,7 @@ def test_quick_stop_without_a_status_after_disable_was_sent_succeeds_at_once() -
 
 
 def test_fault_ends_the_braking_of_a_drive_that_reports_only_faults() -> None:
-    control = machine(ONLY_FAULT)
-    control.request(ControlRequest(QUICK_STOP), 0.0)
+    control = asking(machine(ONLY_FAULT), QUICK_STOP, 0.0)
     cycle(control, READY, 0.0)
     assert (control.word, control.pending) == (STOP, True)
     control.take_completed()
@@ -883,8 +859,7 @@ def test_fault_ends_the_braking_of_a_drive_that_reports_only_faults() -> None:
 
 
 def test_quick_stop_whose_word_is_the_disable_word() -> None:
-    control = enabled(replace(FULL, quick_stop=OFF))
-    control.request(ControlRequest(QUICK_STOP), 1.0)
+    control = asking(enabled(replace(FULL, quick_stop=OFF)), QUICK_STOP, 1.0)
     assert cycle(control, ENABLED, 1.02) == OFF
     assert cycle(control, READY, 1.04) == OFF
     assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
@@ -894,8 +869,7 @@ def test_quick_stop_whose_word_is_the_disable_word() -> None:
 @pytest.mark.parametrize('stop', [DISABLE, QUICK_STOP])
 @pytest.mark.parametrize('start', [ENABLE, RESET_FAULT])
 def test_no_start_cuts_a_stop_short(stop: ControlAction, start: ControlAction) -> None:
-    control = enabled(NO_FAULT)
-    control.request(ControlRequest(stop), 1.0)
+    control = asking(enabled(NO_FAULT), stop, 1.0)
     word = control.word
     control.request(ControlRequest(start), 1.01)
     assert outcomes(control) == [(
@@ -907,8 +881,7 @@ def test_no_start_cuts_a_stop_short(stop: ControlAction, start: ControlAction) -
 
 
 def test_fault_reset_with_nothing_to_reset_does_not_disturb_a_stop() -> None:
-    control = enabled()
-    control.request(ControlRequest(QUICK_STOP), 1.0)
+    control = asking(enabled(), QUICK_STOP, 1.0)
     control.request(ControlRequest(RESET_FAULT), 1.01)
     assert outcomes(control) == [(RESET_FAULT, True, 'enabled')]
     assert (control.word, control.pending) == (STOP, True)
@@ -921,8 +894,7 @@ def test_fault_reset_with_nothing_to_reset_does_not_disturb_a_stop() -> None:
 # -- fault reset ----------------------------------------------------------------------------------
 
 def test_reset_pulses_then_disables_and_waits_for_the_status() -> None:
-    control = faulted()
-    control.request(ControlRequest(RESET_FAULT), 0.01)
+    control = asking(faulted(), RESET_FAULT, 0.01)
     assert control.word == RESET
     assert [cycle(control, FAULT, 0.02 * n) for n in range(1, 4)] == [RESET] * 3
     assert not control.pulsing
@@ -947,8 +919,7 @@ def test_pulse_is_one_word_where_that_is_acknowledged() -> None:
 @pytest.mark.parametrize('gone', [0, 1, 2])
 def test_pulse_is_the_same_when_the_fault_goes_meanwhile(gone: int) -> None:
     """What counts is a status that came after the pulse was over."""
-    control = faulted()
-    control.request(ControlRequest(RESET_FAULT), 0.01)
+    control = asking(faulted(), RESET_FAULT, 0.01)
     if gone == 0:
         control.status_received(READY, 0.02)
     assert [cycle(control, READY if n >= gone else FAULT, 0.02 + 0.02 * n)
@@ -959,8 +930,7 @@ def test_pulse_is_the_same_when_the_fault_goes_meanwhile(gone: int) -> None:
 
 
 def test_reset_that_does_not_help_fails_and_disables() -> None:
-    control = faulted()
-    control.request(ControlRequest(RESET_FAULT), 0.0)
+    control = asking(faulted(), RESET_FAULT, 0.0)
     assert [cycle(control, FAULT, 0.1 * n) for n in range(1, RESET_CYCLES + 2)] == [
         *[RESET] * RESET_CYCLES, OFF]
     control.handle_timer(2.0)
@@ -970,8 +940,7 @@ def test_reset_that_does_not_help_fails_and_disables() -> None:
 
 
 def test_reset_that_could_not_be_sent_says_so() -> None:
-    control = faulted()
-    control.request(ControlRequest(RESET_FAULT), 0.0)
+    control = asking(faulted(), RESET_FAULT, 0.0)
     control.handle_timer(2.0)
     assert outcomes(control) == [(
         RESET_FAULT, False, says(
@@ -990,8 +959,7 @@ def test_word_that_was_not_acknowledged_says_so() -> None:
 
 
 def test_each_reset_is_one_rising_edge() -> None:
-    control = faulted()
-    control.request(ControlRequest(RESET_FAULT), 0.0)
+    control = asking(faulted(), RESET_FAULT, 0.0)
     cycle(control, FAULT, 0.02)
     control.request(ControlRequest(RESET_FAULT), 1.0)
     assert cycle(control, FAULT, 1.02) == RESET
@@ -1006,22 +974,19 @@ def test_each_reset_is_one_rising_edge() -> None:
 
 
 def test_reset_of_a_drive_nobody_knows_looks_first() -> None:
-    control = machine()
-    control.request(ControlRequest(RESET_FAULT), 0.0)
+    control = asking(machine(), RESET_FAULT, 0.0)
     control.word_sent(0.0)
     assert control.word == OFF
     control.status_received(READY, 0.01)
     assert outcomes(control) == [(RESET_FAULT, True, 'ready')]
-    control = machine()
-    control.request(ControlRequest(RESET_FAULT), 0.0)
+    control = asking(machine(), RESET_FAULT, 0.0)
     cycle(control, FAULT, 0.0)
     assert control.word == RESET
 
 
 @pytest.mark.parametrize('table', [SILENT, NO_FAULT])
 def test_reset_of_a_drive_that_reports_no_faults_is_one_pulse(table: ControlTable) -> None:
-    control = machine(table)
-    control.request(ControlRequest(RESET_FAULT), 0.0)
+    control = asking(machine(table), RESET_FAULT, 0.0)
     assert cycle(control, READY, 0.0) == OFF
     assert [cycle(control, READY, 0.02 * n) for n in range(1, RESET_CYCLES + 1)] == [
         RESET] * RESET_CYCLES
@@ -1033,8 +998,7 @@ def test_reset_of_a_drive_that_reports_no_faults_is_one_pulse(table: ControlTabl
 
 
 def test_reset_of_an_enabled_drive_that_reports_no_faults_disables_it() -> None:
-    control = enabled(NO_FAULT)
-    control.request(ControlRequest(RESET_FAULT), 1.0)
+    control = asking(enabled(NO_FAULT), RESET_FAULT, 1.0)
     assert [cycle(control, READY, 1.0 + 0.1 * n) for n in range(RESET_CYCLES + 2)] == [
         OFF, *[RESET] * RESET_CYCLES, OFF]
 
@@ -1054,16 +1018,14 @@ def test_reset_replaces_an_enable() -> None:
 
 
 def test_enable_is_refused_during_a_reset_and_does_not_disturb_it() -> None:
-    control = faulted()
-    control.request(ControlRequest(RESET_FAULT), 0.01)
+    control = asking(faulted(), RESET_FAULT, 0.01)
     control.request(ControlRequest(ENABLE), 0.02)
     assert outcomes(control) == [(ENABLE, False, says('reset_first'))]
     assert (control.word, control.pending) == (RESET, True)
 
 
 def test_enable_replaces_a_reset_where_no_fault_is_known() -> None:
-    control = machine(NO_FAULT)
-    control.request(ControlRequest(RESET_FAULT), 0.0)
+    control = asking(machine(NO_FAULT), RESET_FAULT, 0.0)
     cycle(control, READY, 0.0)
     assert control.word == RESET
     control.request(ControlRequest(ENABLE), 0.01)
@@ -1091,8 +1053,7 @@ def test_withdraw_puts_an_enabled_drive_back() -> None:
 
 @pytest.mark.parametrize('action', [ENABLE, DISABLE, QUICK_STOP])
 def test_withdraw_fails_what_is_under_way(action: ControlAction) -> None:
-    control = machine()
-    control.request(ControlRequest(action), 0.0)
+    control = asking(machine(), action, 0.0)
     control.request(ControlRequest(action), 0.01)
     control.withdraw('drive offline', 1.0)
     assert outcomes(control) == [(action, False, 'drive offline')] * 2
@@ -1101,8 +1062,7 @@ def test_withdraw_fails_what_is_under_way(action: ControlAction) -> None:
 
 
 def test_withdraw_fails_a_reset_and_remembers_the_fault() -> None:
-    control = faulted()
-    control.request(ControlRequest(RESET_FAULT), 0.01)
+    control = asking(faulted(), RESET_FAULT, 0.01)
     control.withdraw('drive offline', 1.0)
     assert outcomes(control) == [(RESET_FAULT, False, 'drive offline')]
     assert (control.word, control.fault) == (OFF, True)
@@ -1123,8 +1083,7 @@ def test_withdraw_forgets_that_there_was_no_fault() -> None:
 
 
 def test_withdraw_after_the_deadline_names_the_deadline() -> None:
-    control = machine()
-    control.request(ControlRequest(ENABLE), 0.0)
+    control = asking(machine(), ENABLE, 0.0)
     control.withdraw('drive offline', 2.0)
     (_, _, message), = outcomes(control)
     assert message == says('stuck', timeout=2.0)
@@ -1144,8 +1103,7 @@ def test_status_from_before_a_withdrawal_confirms_nothing() -> None:
 
 
 def test_withdraw_ends_the_braking_of_a_drive_that_does_not_report() -> None:
-    control = machine(SILENT)
-    control.request(ControlRequest(QUICK_STOP), 0.0)
+    control = asking(machine(SILENT), QUICK_STOP, 0.0)
     control.word_sent(0.02)
     control.take_completed()
     control.withdraw('bridge stops', 0.03)

@@ -140,12 +140,13 @@ class Bench:
         self.exchange.frame_received(frame(text), age)
         return self.link.take()
 
-    def begin(self) -> None:
+    def begin(self) -> 'Bench':
         """Open the bus, and activate."""
         self.exchange.bus_opened()
         self.exchange.activate()
+        return self
 
-    def online(self) -> None:
+    def online(self) -> 'Bench':
         """Bring the drive of station 1 online, at 10.002 s."""
         self.now = 9.998
         self.exchange._last_pass = self.now
@@ -154,6 +155,7 @@ class Bench:
         self.hears('102007E4#00D100D200D30000', 10.0)
         self.at(10.0)
         self.hears('103FFFF0#03E800FA00010000', 10.002)
+        return self
 
 
 def all_routes(bench: Bench) -> list[Route]:

@@ -42,8 +42,7 @@ def _clock(bench: world.World) -> JumpingClock:
 
 def running() -> Bench:
     """Return one whose drive was told to run, at 10.02 s."""
-    bench = Bench(drive(rearm_immediate=True))
-    bench.online()
+    bench = Bench(drive(rearm_immediate=True)).online()
     bench.notes[0].commands.append((0, 100.0))
     assert bench.at(10.02) == ['003FFFF0#03E8000000000000']
     return bench
@@ -67,8 +66,7 @@ def test_both_begin_when_bus_and_activity_are_there() -> None:
     '7A4#0032003300000000', '000#',   # 11 bits
 ])
 def test_frames_of_nobody_are_counted_by_the_bus(text: str) -> None:
-    bench = Bench()
-    bench.begin()
+    bench = Bench().begin()
     bench.link.take()
     assert bench.hears(text, 10.001) == []
     assert bench.exchange.frames_rejected == 1
@@ -117,8 +115,7 @@ def test_routes_become_filters_of_the_link(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_samples_and_events_reach_their_listener() -> None:
-    bench = Bench()
-    bench.online()
+    bench = Bench().online()
     first, second = bench.notes
     assert [event.raws for event in first.samples] == [(1000, 250, 1)]
     assert first.samples[0].received_at == 10.002
@@ -127,16 +124,14 @@ def test_samples_and_events_reach_their_listener() -> None:
 
 
 def test_age_of_a_frame_is_taken_off_its_stamp() -> None:
-    bench = Bench()
-    bench.online()
+    bench = Bench().online()
     bench.at(10.02)
     bench.hears(ANSWER, 10.025, age=0.004)
     assert bench.notes[0].samples[-1].received_at == pytest.approx(10.021)
 
 
 def test_commands_are_taken_just_before_a_cycle() -> None:
-    bench = Bench(drive(rearm_immediate=True))
-    bench.online()
+    bench = Bench(drive(rearm_immediate=True)).online()
     bench.notes[0].commands.append((0, 100.0))
     assert bench.at(10.01) == []
     assert bench.notes[0].commands
@@ -146,8 +141,7 @@ def test_commands_are_taken_just_before_a_cycle() -> None:
 
 def test_a_drive_that_comes_after_a_slow_one_has_the_time_of_its_own_turn() -> None:
     bench = Bench(drive(name='first', station=1, mapping='assume', rearm_immediate=True),
-                  drive(name='second', station=2, mapping='assume', rearm_immediate=True))
-    bench.begin()
+                  drive(name='second', station=2, mapping='assume', rearm_immediate=True)).begin()
     for step in range(4):
         bench.at(10.0 + 0.01 * step)
         for station in (1, 2):
@@ -209,8 +203,7 @@ def test_who_is_served_after_a_stall_in_the_midst_of_a_pass_gets_nothing_stale(
 
 
 def test_an_enable_that_comes_with_the_end_of_a_stall_finds_the_drive_lost() -> None:
-    bench = Bench(drive(control=CONTROL))
-    bench.online()
+    bench = Bench(drive(control=CONTROL)).online()
     bench.now = 11.5        # no pass has noticed it yet
     bench.exchange.submit(bench.sessions[0], ControlRequest(ControlAction.ENABLE))
     assert not bench.sessions[0].online
@@ -219,8 +212,7 @@ def test_an_enable_that_comes_with_the_end_of_a_stall_finds_the_drive_lost() -> 
 
 
 def test_pass_says_when_the_next_is_due() -> None:
-    bench = Bench(drive())
-    bench.online()
+    bench = Bench(drive()).online()
     assert bench.exchange._pass() == pytest.approx(10.02)
     bench.at(10.02)
     assert bench.exchange._pass() == pytest.approx(10.04)
@@ -260,8 +252,7 @@ def test_lost_time_is_noticed_by_the_timer() -> None:
 
 
 def test_a_little_less_is_not_lost() -> None:
-    bench = Bench(drive())
-    bench.online()
+    bench = Bench(drive()).online()
     bench.at(10.02)
     bench.hears(ANSWER, 10.021)
     assert bench.at(11.0199) == [NEUTRAL]
@@ -269,8 +260,7 @@ def test_a_little_less_is_not_lost() -> None:
 
 
 def test_lost_time_is_noticed_by_the_reader_first() -> None:
-    bench = Bench(drive(rearm_immediate=True))
-    bench.online()
+    bench = Bench(drive(rearm_immediate=True)).online()
     bench.at(10.02)
     # the answer lay in a queue while the process stood still
     assert bench.hears(ANSWER, 15.0) == [ASK_MAP_1]
@@ -422,8 +412,7 @@ def test_what_a_frame_makes_due_wakes_nobody_but_the_reader() -> None:
 
 @pytest.mark.interpreted    # replaces a property
 def test_deactivate_gives_up_in_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(drive())
-    bench.online()
+    bench = Bench(drive()).online()
     bench.step = 0.01
     monkeypatch.setattr(BusExchange, 'stopped', False)
     started = bench.now
@@ -510,8 +499,7 @@ def test_silent_member_of_a_broadcast_group_goes_offline() -> None:
     setpoint = parameter('speed_setpoint', None, type=INT16, scale=0.1, unit='%')
     group = [drive('cannord', name=name, station=station, broadcast='all', request=(setpoint,),
                    response=(), table=(setpoint,)) for name, station in (('one', 1), ('two', 2))]
-    bench = Bench(*group)
-    bench.begin()
+    bench = Bench(*group).begin()
     now = 10.0
     answers = {'002': '003#310B0000', '004': '005#310B0000'}
     for step in range(40):
@@ -571,8 +559,7 @@ def test_deactivate_without_a_bus_is_done_at_once() -> None:
 
 
 def test_requests_are_sent_at_once_and_answered_as_events() -> None:
-    bench = Bench(drive())
-    bench.online()
+    bench = Bench(drive()).online()
     request = read(GAIN)
     bench.now = 10.003
     bench.exchange.submit(bench.sessions[0], request)
@@ -587,8 +574,7 @@ def test_the_number_of_a_fault_is_asked_for_at_once() -> None:
     conveyor = drive(period=0.5, parameter_timeout=0.1, parameter_retries=0)
     bench = Bench(replace(conveyor, profile=replace(
         conveyor.profile, parameters={**conveyor.profile.parameters, 'fault_code': code},
-        fault=FaultTable('fault_code', ((7, 'overcurrent'),), ('status_word', 8)))))
-    bench.online()
+        fault=FaultTable('fault_code', ((7, 'overcurrent'),), ('status_word', 8))))).online()
     assert bench.at(10.5) == [NEUTRAL]
     assert bench.hears('103FFFF0#03E800FA00080000', 10.502) == [f'00200D91#{ZEROS}']
     bench.hears('10200D91#0007000000000000', 10.504)
@@ -597,8 +583,7 @@ def test_the_number_of_a_fault_is_asked_for_at_once() -> None:
 
 
 def test_control_request_is_answered_by_an_event() -> None:
-    bench = Bench(drive(control=CONTROL, request=(WORD, SPEED), mapping='assume'))
-    bench.begin()
+    bench = Bench(drive(control=CONTROL, request=(WORD, SPEED), mapping='assume')).begin()
     bench.at(10.0)
     bench.hears(ANSWER, 10.002)
     bench.at(10.02)
@@ -620,8 +605,7 @@ def test_reconfigure() -> None:
 
 
 def test_bus_that_is_lost_and_comes_back() -> None:
-    bench = Bench(drive())
-    bench.online()
+    bench = Bench(drive()).online()
     bench.exchange.bus_lost('unplugged')
     assert (bench.exchange.bus_state, bench.exchange.bus_reason) == ('down', 'unplugged')
     assert bench.notes[0].events[-1] == StationLost(
@@ -635,8 +619,7 @@ def test_bus_that_is_lost_and_comes_back() -> None:
 
 
 def test_bits_on_the_bus() -> None:
-    bench = Bench(drive())
-    bench.begin()
+    bench = Bench(drive()).begin()
     assert bench.exchange.sent_bits == 131       # without stuff bits, as in the golden vectors
     bench.hears('7F1#2211000000000000', 10.001)
     assert bench.exchange.received_bits == 111
@@ -702,8 +685,7 @@ def test_defect_in_the_timer_thread_is_told_not_swallowed(clock: JumpingClock) -
 def test_a_session_that_fails_keeps_no_other_from_its_stop(
         broken: str, stopped: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench(drive(name='first', station=1, mapping='assume'),
-                  drive(name='second', station=2, mapping='assume'))
-    bench.begin()
+                  drive(name='second', station=2, mapping='assume')).begin()
     bench.at(10.0)
     bench.at(10.02)
 
@@ -724,8 +706,7 @@ def test_a_session_that_fails_keeps_no_other_from_its_stop(
 
 
 def test_frames_that_nobody_else_should_send_are_counted() -> None:
-    bench = Bench(drive('canopen_pkw', name='first', station=1))
-    bench.begin()
+    bench = Bench(drive('canopen_pkw', name='first', station=1)).begin()
     bench.hears('080#', 10.1)           # SYNC, and a PDO of the node
     bench.hears('181#0000', 10.2)
     assert bench.exchange.frames_rejected == 2
@@ -738,8 +719,7 @@ def test_frames_that_nobody_else_should_send_are_counted() -> None:
 
 def test_whatever_is_due_sooner_wakes_the_timer() -> None:
     bench = Bench(drive(period=5.0, mapping='assume', parameter_retries=0,
-                        parameter_timeout=0.02))
-    bench.begin()
+                        parameter_timeout=0.02)).begin()
     bench.at(10.0)
     bench.hears(ANSWER, 10.001)
     exchange = bench.exchange
@@ -759,8 +739,7 @@ def test_whatever_is_due_sooner_wakes_the_timer() -> None:
 
 
 def test_age_of_a_frame_does_not_shorten_the_pause_after_an_eeprom_write() -> None:
-    bench = Bench(drive(period=5.0, mapping='assume'))
-    bench.begin()
+    bench = Bench(drive(period=5.0, mapping='assume')).begin()
     bench.at(10.0)
     bench.hears(ANSWER, 10.001)
     bench.now = 10.1
@@ -781,8 +760,7 @@ def test_close_without_open() -> None:
     (0.26, '0000'),     # neutral armed, but what came since has waited too long
     (0.9, '0000')])
 def test_what_waits_when_the_exchange_is_late_is_not_believed(late: float, sent: str) -> None:
-    bench = Bench(drive(rearm_immediate=False, command_timeout=5.0))
-    bench.online()
+    bench = Bench(drive(rearm_immediate=False, command_timeout=5.0)).online()
     [notes] = bench.notes
     notes.commands.append((0, 0.0))
     bench.at(10.02)
@@ -798,8 +776,7 @@ def test_what_waits_when_the_exchange_is_late_is_not_believed(late: float, sent:
 
 
 def test_what_was_sent_is_told_on_change_and_once_a_second() -> None:
-    bench = Bench(drive(name='first', station=1, command_timeout=0.0))
-    bench.online()
+    bench = Bench(drive(name='first', station=1, command_timeout=0.0)).online()
     [notes] = bench.notes
     notes.told.clear()
     for step in range(1, 60):

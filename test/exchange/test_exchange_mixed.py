@@ -55,8 +55,7 @@ def test_what_came_in_one_packet_is_taken_before_anything_is_sent() -> None:
     """The answer of a node and its boot-up frame: no request of before follows."""
     target = parameter('target', None, index=0x60FF, subindex=0, type=INT32)
     bench = Bench(drive('cia402', name='servo', station=5, mode='pv', table=(target,),
-                        request=(target,), response=()))
-    bench.begin()
+                        request=(target,), response=())).begin()
     assert bench.link.take()[-1] == '605#4041600000000000'
     bench.link.coming = [frame('705#00'), frame('706#05'), frame('705#7F')]
     assert bench.hears('585#4B41600050020000', 10.01) == ['605#4041600000000000']   # again
@@ -72,8 +71,7 @@ def test_the_start_of_another_master_concerns_all_nodes() -> None:
     target = parameter('target', None, index=0x60FF, subindex=0, type=INT32)
     bench = Bench(drive('cia402', name='servo', station=5, mode='pv', table=(target,),
                         request=(target,), response=()),
-                  drive('canopen_pkw', name='starter', station=6))
-    bench.begin()
+                  drive('canopen_pkw', name='starter', station=6)).begin()
 
     def told(text: str) -> list[list[str]]:
         for notes in bench.notes:

@@ -126,11 +126,12 @@ class Bridge:
             return ClockedRecorder(self.channel(bus))
         return Recorder(self.channel(bus))
 
-    def online(self, *names: str, timeout: float = 60.0) -> None:
+    def online(self, *names: str, timeout: float = 60.0) -> 'Bridge':
         """Wait until drives are online; all of them by default."""
         wait_until(lambda: all(self.node.drives[name].session.online
                                for name in names or self.node.drives), timeout,
                    'drives that come online')
+        return self
 
     def close(self) -> None:
         """End everything, in the order of the executable."""

@@ -112,7 +112,6 @@ def locally(monkeypatch: pytest.MonkeyPatch) -> 'Lines':
 def shared_bridge(bridge: 'StartBridge') -> 'StartBridge':
     """Start a bridge whose drives are online."""
     def start(content: object = None) -> 'Bridge':
-        one = bridge(content)
-        one.online()
+        one = bridge(content).online()
         return one
     return start

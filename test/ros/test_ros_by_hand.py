@@ -97,8 +97,7 @@ def test_names_patterns_and_namespaces(
 
 def test_one_that_hangs_is_named_first_and_the_others_are_stopped(
         bridge: StartBridge, client: Client, run: Run) -> None:
-    one = bridge(parameters(lift=LIFT))
-    one.online()
+    one = bridge(parameters(lift=LIFT)).online()
     assert run('enable', 'lift')[0] == 0
     hang(client, '/b/bridge')
     replay('one bridge hangs', run)
@@ -107,8 +106,7 @@ def test_one_that_hangs_is_named_first_and_the_others_are_stopped(
 
 def test_a_name_that_is_none_keeps_nobody_from_being_stopped(
         bridge: StartBridge, client: Client, run: Run) -> None:
-    one = bridge(parameters(lift=LIFT))
-    one.online()
+    one = bridge(parameters(lift=LIFT)).online()
     answer(client, '/a/bridge', others=['/b b/bridge', ''], drives='-')()
     liar = Presence(one.context.get_domain_id(), '/-/bridge')   # any user may say so
     try:
@@ -129,8 +127,7 @@ def test_one_that_another_one_sees_is_named(
 
 def test_one_that_holds_drives_of_this_host_is_named(
         bridge: StartBridge, run: Run) -> None:
-    one = bridge(parameters(lift=LIFT))
-    one.online()
+    one = bridge(parameters(lift=LIFT)).online()
     domain = one.context.get_domain_id()
     here, elsewhere = Presence(domain, '/b/bridge'), Presence(domain + 1, '/drive_can_bridge')
     try:
@@ -249,8 +246,7 @@ def test_wrong_usage_is_told_before_anybody_is_looked_for(words: tuple[str, ...]
 @pytest.mark.parametrize('listens', [False, True])
 def test_a_fault_is_reset(
         bridge: StartBridge, run: Run, locally: Lines, listens: bool) -> None:
-    one = bridge(parameters(lift=LIFT))
-    one.online()
+    one = bridge(parameters(lift=LIFT)).online()
     if listens:
         locally(one)
     one.played['lift'].fault('trip')

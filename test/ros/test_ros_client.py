@@ -42,8 +42,7 @@ def reasons(outcomes: dict[str, Any]) -> dict[str, str]:
 
 def test_everything_of_four_families(bridge: StartBridge) -> None:
     one = bridge(parameters(conveyor=CONVEYOR, lift=LIFT, mixer=MIXER, pump=PUMP),
-                 arguments=('-r', '__ns:=/cell'))
-    one.online()
+                 arguments=('-r', '__ns:=/cell')).online()
     source = find_source(namespace='/cell')
     assert list(source.names) == ['conveyor', 'lift', 'mixer', 'pump']
     assert 'ramp_time' in source.parameter_names('lift')
@@ -114,8 +113,7 @@ def _refusals(conveyor: Drive, lift: Drive, bridge: Bridge) -> None:
 
 
 def test_what_fails_says_why(bridge: StartBridge) -> None:
-    one = bridge(parameters(conveyor={**CONVEYOR, **HASTY}))
-    one.online()
+    one = bridge(parameters(conveyor={**CONVEYOR, **HASTY})).online()
     with open_drives() as drives:
         conveyor = drives['conveyor']
         assert reasons(conveyor.read('p9999', 'ramp_time', 'bogus', '\udcff')) == {

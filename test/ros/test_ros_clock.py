@@ -27,8 +27,7 @@ def test_clock_that_is_set(bridge: StartBridge, client: Client, monkeypatch: pyt
                            hours: float) -> None:
     offset = [0.0]
     set_clock(monkeypatch, lambda true: true + int(offset[0] * 1e9))
-    one = bridge(parameters(conveyor=CONVEYOR))
-    one.online()
+    one = bridge(parameters(conveyor=CONVEYOR)).online()
     session = one.node.drives['conveyor'].session
     client.publish('/conveyor/command/torque_limit', Float64(data=0.0))
     client.publish('/conveyor/command/speed_setpoint', Float64(data=0.0))
@@ -68,8 +67,7 @@ def test_a_sample_has_one_stamp_when_the_clock_is_set_behind_it(
     """In all messages with that sample, and as long as it is the last one."""
     content = parameters(conveyor={**CONVEYOR, 'missed_limit': 1000, 'joint': {
         'name': 'belt', 'velocity': 'actual_speed'}})
-    one = bridge(content)
-    one.online()
+    one = bridge(content).online()
     topics = [client.topic(name, kind) for name, kind in (
         ('/conveyor/response', ParameterEvent), ('/conveyor/joint_state', JointState),
         ('/drive_can_bridge/joint_states', JointState))]
@@ -103,8 +101,7 @@ def test_a_time_that_no_stamp_holds_is_0_and_told_once(monkeypatch: pytest.Monke
 
 def test_drives_go_on_when_the_system_clock_says_what_no_stamp_holds(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    one = bridge(with_joint())
-    one.online()
+    one = bridge(with_joint()).online()
     client.listen()
     topics = stamped_topics(client)
     set_clock(monkeypatch, lambda _: -5 * 10 ** 9)
@@ -115,8 +112,7 @@ def test_drives_go_on_when_the_system_clock_says_what_no_stamp_holds(
     (2 ** 31 - 1, 2 ** 32 - 1), (-1, 0), (-2 ** 31, 0)], 3))
 def test_drives_go_on_whatever_simulated_time_is_published(
         bridge: StartBridge, client: Client, seconds: int, nanoseconds: int) -> None:
-    one = bridge({**with_joint(), 'use_sim_time': True})
-    one.online()
+    one = bridge({**with_joint(), 'use_sim_time': True}).online()
     client.listen()
     topics = stamped_topics(client)
     said = [Time(sec=1000)]

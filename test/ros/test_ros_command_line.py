@@ -28,8 +28,7 @@ Ros2 = Callable[..., str]
 @pytest.fixture(name='demo')
 def _demo(bridge: StartBridge, client: Client) -> Bridge:
     text = (CONFIG / 'demo.yaml').read_text(encoding='utf-8')
-    one = bridge(text.replace('channel: demo', 'channel: ros_test_command_line'))
-    one.online()
+    one = bridge(text.replace('channel: demo', 'channel: ros_test_command_line')).online()
     wait_until(lambda: {'/conveyor', '/lift', '/turntable'} <= set(client.nodes()))
     return one
 

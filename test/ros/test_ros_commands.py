@@ -42,8 +42,7 @@ def arm(client: Client, recorder: Recorder, speed: float = 100.0) -> None:
 
 
 def test_newest_wins(bridge: StartBridge, client: Client) -> None:
-    one = bridge()
-    one.online()
+    one = bridge().online()
     with one.record() as recorder:
         arm(client, recorder)
         for value in range(200):
@@ -55,8 +54,7 @@ def test_newest_wins(bridge: StartBridge, client: Client) -> None:
 
 def test_a_time_out_is_told_and_wants_arming_again(bridge: StartBridge,
                                                    client: Client) -> None:
-    one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 2.0}))
-    one.online()
+    one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 2.0})).online()
     with one.record() as recorder:
         arm(client, recorder)
         until_sent(recorder, 0, 0)
@@ -72,8 +70,7 @@ def test_a_time_out_is_told_and_wants_arming_again(bridge: StartBridge,
 
 def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
         bridge: StartBridge, client: Client) -> None:
-    one = bridge(parameters(conveyor=CONVEYOR))
-    one.online()
+    one = bridge(parameters(conveyor=CONVEYOR)).online()
     with one.record() as recorder:
         arm(client, recorder)
         exchange, = one.node.exchanges.values()
@@ -100,8 +97,7 @@ def test_a_neutral_that_is_not_zero(bridge: StartBridge, client: Client, tmp_pat
     profile.write_text(PROFILE, encoding='utf-8')
     one = bridge(parameters(conveyor={
         **CONVEYOR, 'profile': str(profile), 'cyclic_request': ['counts'],
-        'cyclic_response': ['actual']}))
-    one.online()
+        'cyclic_response': ['actual']})).online()
     topic = '/conveyor/command/counts'
     status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
     assert sentences.not_armed([f'5 to {topic}']) in status['message']
@@ -119,8 +115,7 @@ def test_joint_command(bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(conveyor={
         **TWO_SETPOINTS, 'joint': {
             'name': 'belt', 'velocity': 'actual_speed', 'velocity_command': 'speed_setpoint',
-            'effort_command': 'position_setpoint', 'gear_ratio': 10.0}}))
-    one.online()
+            'effort_command': 'position_setpoint', 'gear_ratio': 10.0}})).online()
     topic = '/conveyor/joint_command'
     one_rpm = 2 * math.pi / 60 / 10
     with one.record() as recorder:
@@ -162,8 +157,7 @@ def test_joint_command(bridge: StartBridge, client: Client) -> None:
 
 def test_commands_while_offline_have_no_effect_later(bridge: StartBridge,
                                                      client: Client) -> None:
-    one = bridge(parameters(conveyor={**CONVEYOR, **HASTY, 'rearm': 'immediate'}))
-    one.online()
+    one = bridge(parameters(conveyor={**CONVEYOR, **HASTY, 'rearm': 'immediate'})).online()
     with one.record() as recorder:
         client.publish(SPEED, Float64(data=100.0))
         until_sent(recorder, 0, 1000)
@@ -184,8 +178,7 @@ def test_commands_while_offline_have_no_effect_later(bridge: StartBridge,
 @pytest.mark.parametrize('reliability', list(ReliabilityPolicy)[1:3])
 def test_any_publisher_will_do(bridge: StartBridge, client: Client,
                                reliability: ReliabilityPolicy) -> None:
-    one = bridge()
-    one.online()
+    one = bridge().online()
     with one.record() as recorder:
         client.publisher(SPEED, Float64, QoSProfile(depth=1, reliability=reliability))
         arm(client, recorder)
@@ -193,8 +186,7 @@ def test_any_publisher_will_do(bridge: StartBridge, client: Client,
 
 def test_another_publisher_has_another_clock(bridge: StartBridge, client: Client) -> None:
     """How quick the last one was says nothing about who comes when it has gone."""
-    one = bridge(parameters(conveyor={**CONVEYOR, 'cyclic_request': ['speed_setpoint']}))
-    one.online()
+    one = bridge(parameters(conveyor={**CONVEYOR, 'cyclic_request': ['speed_setpoint']})).online()
     with one.record() as recorder:
         quick, slow = (client.node.create_publisher(Float64, SPEED, 1) for _ in range(2))
         slow.handle.behind = 10_000_000_000
@@ -226,8 +218,7 @@ JOINT = {'name': 'belt', 'velocity': 'actual_speed', 'velocity_command': 'speed_
 def test_a_publisher_whose_clock_is_set_back_arms_again(bridge: StartBridge, client: Client,
                                                         topic: str) -> None:
     """What its topic commands is disarmed, nothing else is; and it counts again from there."""
-    one = bridge(parameters(conveyor={**CONVEYOR, 'joint': JOINT}))
-    one.online()
+    one = bridge(parameters(conveyor={**CONVEYOR, 'joint': JOINT})).online()
     client.listen()
 
     def send(speed: float) -> None:
@@ -256,8 +247,7 @@ def test_a_publisher_whose_clock_is_set_back_arms_again(bridge: StartBridge, cli
 def test_a_publisher_that_is_steadily_late_is_obeyed_after_10_s(bridge: StartBridge,
                                                                 client: Client) -> None:
     """Its clock was set back by less than what lies between two of its commands."""
-    one = bridge(parameters(conveyor={**CONVEYOR, 'cyclic_request': ['speed_setpoint']}))
-    one.online()
+    one = bridge(parameters(conveyor={**CONVEYOR, 'cyclic_request': ['speed_setpoint']})).online()
     client.listen()
     with one.record() as recorder:
         arm(client, recorder)
@@ -275,8 +265,7 @@ def test_a_publisher_that_is_steadily_late_is_obeyed_after_10_s(bridge: StartBri
 
 def test_of_two_publishers_the_one_behind_can_only_stop(bridge: StartBridge,
                                                         client: Client) -> None:
-    one = bridge(parameters(conveyor={**CONVEYOR, 'cyclic_request': ['speed_setpoint']}))
-    one.online()
+    one = bridge(parameters(conveyor={**CONVEYOR, 'cyclic_request': ['speed_setpoint']})).online()
     client.listen()
     with one.record() as recorder:
         arm(client, recorder)
@@ -297,8 +286,7 @@ def test_of_two_publishers_the_one_behind_can_only_stop(bridge: StartBridge,
 def test_an_integer_in_a_float_field_stops_and_says_why(bridge: StartBridge,
                                                         client: Client) -> None:
     """Message classes check no types: what stands in its place arrives."""
-    one = bridge(parameters(conveyor={**CONVEYOR, 'joint': JOINT}))
-    one.online()
+    one = bridge(parameters(conveyor={**CONVEYOR, 'joint': JOINT})).online()
     client.listen()
     with one.record() as recorder:
         arm(client, recorder)
@@ -326,8 +314,7 @@ def test_an_integer_in_a_float_field_stops_and_says_why(bridge: StartBridge,
 def test_incompatible_publishers_are_told_about(bridge: StartBridge, client: Client) -> None:
     content = parameters()
     content['qos_overrides'] = {SPEED: {'subscription': {'reliability': 'reliable'}}}
-    one = bridge(content)
-    one.online()
+    bridge(content).online()
     client.node.create_publisher(Float64, SPEED, QoSProfile(
         depth=1, reliability=ReliabilityPolicy.BEST_EFFORT))
     client.wait_logged(f'conveyor: a publisher of {SPEED} offers incompatible quality of service '

@@ -54,8 +54,7 @@ def test_a_drive_that_does_not_obey_a_stop_is_not_simply_disabled(
 
 
 def test_a_fault_says_which_it_is(bridge: StartBridge, client: Client) -> None:
-    one = bridge(parameters(lift=LIFT))
-    one.online()
+    one = bridge(parameters(lift=LIFT)).online()
     client.diagnostics(DRIVE, lambda drive: drive['fault_code'] == '')
     one.played['lift'].fault('trip')
     status = client.diagnostics(DRIVE, lambda drive: drive['fault_code'] == FAULT)
@@ -78,8 +77,7 @@ def test_the_log_says_what_was_asked_through_ros(bridge: StartBridge, client: Cl
 
 
 def test_a_flood_of_questions_is_no_flood_of_lines(bridge: StartBridge, client: Client) -> None:
-    one = bridge(parameters(lift=LIFT))
-    one.online()
+    one = bridge(parameters(lift=LIFT)).online()
     client.listen()
     for number in range(50):
         one.node.drives['lift'].command(
@@ -91,8 +89,7 @@ def test_a_flood_of_questions_is_no_flood_of_lines(bridge: StartBridge, client: 
 
 
 def test_quick_stop_without_a_control_word(bridge: StartBridge, client: Client) -> None:
-    one = bridge()
-    one.online()
+    one = bridge().online()
     client.publish('/conveyor/command/speed_setpoint', Float64(data=0.0))
     client.publish('/conveyor/command/speed_setpoint', Float64(data=300.0))
     wait_until(lambda: float(one.played['conveyor'].value('speed_setpoint')) == 300.0)
@@ -107,8 +104,7 @@ def test_quick_stop_without_a_control_word(bridge: StartBridge, client: Client) 
 
 
 def test_going_offline_answers_what_is_under_way(bridge: StartBridge, client: Client) -> None:
-    one = bridge(parameters(lift={**LIFT, **HASTY, 'control_timeout': 60.0}))
-    one.online()
+    one = bridge(parameters(lift={**LIFT, **HASTY, 'control_timeout': 60.0})).online()
     one.played['lift'].set_value('status_word', 0)
     future = client.ask('/lift/enable', SetBool, SetBool.Request(data=True))
     wait_until(lambda: one.node.drives['lift'].session.control.pending)
@@ -119,8 +115,7 @@ def test_going_offline_answers_what_is_under_way(bridge: StartBridge, client: Cl
 
 
 def test_a_stop_waits_for_no_other_service(bridge: StartBridge, client: Client) -> None:
-    one = bridge(parameters(lift=LIFT))
-    one.online()
+    one = bridge(parameters(lift=LIFT)).online()
     client.service('/lift/quick_stop', Trigger)
     assert enable(client)[0]
     reached, go_on = clock().wake_event(), clock().wake_event()

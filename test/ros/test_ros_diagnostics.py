@@ -34,8 +34,7 @@ PAGE = PACKAGE.parent / 'docs' / 'ros_interface.md'
 
 
 def test_names_and_keys(bridge: StartBridge, client: Client) -> None:
-    one = bridge(parameters(conveyor=CONVEYOR, other={**CONVEYOR, 'station': 2}))
-    one.online()
+    bridge(parameters(conveyor=CONVEYOR, other={**CONVEYOR, 'station': 2})).online()
     message = client.topic('/diagnostics', DiagnosticArray).wait()
     assert [status.name for status in message.status] == [BUS, DRIVE, OTHER]
     assert message.header.stamp.sec > 0
@@ -128,8 +127,7 @@ def by_hand(**keys: Any) -> dict[str, Any]:
 
 def test_a_round_that_users_held_up_is_no_slow_drive(bridge: StartBridge,
                                                      client: Client) -> None:
-    one = bridge(by_hand(protocol='datamodel_standard', period=0.1))
-    one.online()
+    one = bridge(by_hand(protocol='datamodel_standard', period=0.1)).online()
     _, reporter = reporters(one)
     statistics = one.node.drives['conveyor'].session.statistics
 
@@ -145,8 +143,7 @@ def test_a_round_that_users_held_up_is_no_slow_drive(bridge: StartBridge,
 
 def test_a_limit_that_is_not_in_effect_is_an_error(
         bridge: StartBridge, monkeypatch: pytest.MonkeyPatch) -> None:
-    one = bridge(by_hand())
-    one.online()
+    one = bridge(by_hand()).online()
     why = sentences.limit_in_vain('torque_limit (6072h.00h) stays 100 % although 30 % is sent')
     monkeypatch.setattr(type(one.node.drives['conveyor'].session), 'error', why)
     report = reporters(one)[1].report(clock().now())
@@ -154,8 +151,7 @@ def test_a_limit_that_is_not_in_effect_is_an_error(
 
 
 def test_what_is_over_is_not_told_again(bridge: StartBridge) -> None:
-    one = bridge(by_hand())
-    one.online()
+    one = bridge(by_hand()).online()
     bus, drive = reporters(one)
     link = one.node.exchanges['main'].link
     with one.record() as recorder:
@@ -176,8 +172,7 @@ def test_what_is_over_is_not_told_again(bridge: StartBridge) -> None:
 
 def test_frames_that_the_adapter_refused_afterwards_were_not_sent(
         bridge: StartBridge, monkeypatch: pytest.MonkeyPatch) -> None:
-    one = bridge(by_hand())
-    one.online()
+    one = bridge(by_hand()).online()
     bus, _ = reporters(one)
     link = one.node.exchanges['main'].link
     monkeypatch.setattr(type(link), 'counts', Counts(refused=3))
@@ -192,8 +187,7 @@ def test_frames_that_the_adapter_refused_afterwards_were_not_sent(
 
 
 def test_the_load_is_that_of_both_directions(bridge: StartBridge) -> None:
-    one = bridge(by_hand())
-    one.online()
+    one = bridge(by_hand()).online()
     bus, _ = reporters(one)
     exchange = one.node.exchanges['main']
 
@@ -209,8 +203,7 @@ def test_the_load_is_that_of_both_directions(bridge: StartBridge) -> None:
 
 
 def test_strangers_are_counted_and_told(bridge: StartBridge, client: Client) -> None:
-    one = bridge()
-    one.online()
+    one = bridge().online()
     with one.record() as recorder:
         for _ in range(3):  # nobody asked for parameter 99
             recorder.send(0x10200000 | 99 << 4 | 1, bytes(8))
@@ -231,8 +224,7 @@ def test_a_late_answer_in_words(seconds: float, words: str) -> None:
 
 
 def test_late_answers_are_no_second_station(bridge: StartBridge, client: Client) -> None:
-    one = bridge()
-    one.online()
+    one = bridge().online()
     drive, = one.node.drives.values()
     with drive.exchange.lock:
         drive.session.report.unasked(NOTHING, 0.004, math.inf)
@@ -250,8 +242,7 @@ def test_late_answers_are_no_second_station(bridge: StartBridge, client: Client)
 
 def test_an_adapter_that_keeps_what_it_has_received(bridge: StartBridge,
                                                    monkeypatch: pytest.MonkeyPatch) -> None:
-    one = bridge(by_hand())
-    one.online()
+    one = bridge(by_hand()).online()
     exchange, (drive,) = one.node.exchanges['main'], one.node.drives.values()
     command = 'echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer'
     monkeypatch.setattr(diagnostics, 'traits_of', lambda bus: AdapterTraits(
@@ -332,8 +323,7 @@ def test_mapping_differs(bridge: StartBridge, client: Client) -> None:
 
 
 def test_mapping_configure_rewrites(bridge: StartBridge, client: Client) -> None:
-    one = bridge(parameters(conveyor={**CONVEYOR, 'mapping': 'configure'}))
-    one.online()
+    one = bridge(parameters(conveyor={**CONVEYOR, 'mapping': 'configure'})).online()
     client.wait_logged('conveyor: maps of the drive rewritten: request map [50, 51], response map '
                        '[209, 210, 211]')
     drive = one.played['conveyor']
@@ -343,8 +333,7 @@ def test_mapping_configure_rewrites(bridge: StartBridge, client: Client) -> None
 
 
 def test_the_last_message_says_that_it_is_the_last(bridge: StartBridge, client: Client) -> None:
-    one = bridge(parameters(conveyor={**CONVEYOR, 'cyclic_request': []}))
-    one.online()
+    one = bridge(parameters(conveyor={**CONVEYOR, 'cyclic_request': []})).online()
     topic = client.topic('/diagnostics', DiagnosticArray)
     topic.wait()
     one.node.stop()
@@ -366,8 +355,7 @@ def test_what_is_refused_is_never_ok(bridge: StartBridge, client: Client, tmp_pa
     one = bridge(parameters(conveyor={
         'bus': 'main', 'protocol': 'canopen_pkw', 'station': 1, 'profile': str(profile),
         'period': 0.1, 'cyclic_response': ['speed', 'missing'], 'missed_limit': 100,
-        'parameter_timeout': 2.0}))
-    one.online()
+        'parameter_timeout': 2.0})).online()
     status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'online')
     assert (status['level'], status['message']) == ('OK', 'online')
     table: Any = one.played['conveyor'].drive

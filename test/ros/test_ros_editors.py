@@ -55,8 +55,7 @@ def editors(client: Client, node: str) -> dict[str, tuple[Any, ParameterDescript
 
 
 def test_a_drive(bridge: StartBridge, client: Client) -> None:
-    one = bridge(parameters(conveyor=CONVEYOR))
-    one.online()
+    one = bridge(parameters(conveyor=CONVEYOR)).online()
     shown = editors(client, '/conveyor')
     assert len(shown) == 24 and 'user_command' not in shown  # write-only: there is no value
     assert [name for name, (_, entry) in shown.items() if entry.read_only] == [
@@ -69,8 +68,7 @@ def test_a_drive(bridge: StartBridge, client: Client) -> None:
 
 
 def test_what_the_drive_does_not_have(bridge: StartBridge, client: Client) -> None:
-    one = bridge(parameters(conveyor={**CONVEYOR, **HASTY, 'missed_limit': 1000}))
-    one.online()
+    one = bridge(parameters(conveyor={**CONVEYOR, **HASTY, 'missed_limit': 1000})).online()
     before = list(editors(client, '/conveyor'))
     table: Any = one.played['conveyor'].drive
     entry = table.table._parameters.pop(30)  # ramp_time: an older drive than the profile is for
@@ -83,11 +81,10 @@ def test_what_the_drive_does_not_have(bridge: StartBridge, client: Client) -> No
 def test_wide_integers(bridge: StartBridge, client: Client, tmp_path: Path) -> None:
     profile = tmp_path / 'wide.yaml'
     profile.write_text(WIDE, encoding='utf-8')
-    one = bridge(parameters(conveyor={
+    bridge(parameters(conveyor={
         'bus': 'main', 'protocol': 'canopen_pkw', 'station': 1, 'profile': str(profile),
         'period': 0.2, 'cyclic_response': ['power'], 'missed_limit': 100,
-        'parameter_timeout': 2.0}))
-    one.online()
+        'parameter_timeout': 2.0})).online()
     shown = editors(client, '/conveyor')
     assert list(shown) == ['energy', 'distance', 'limited', 'power', 'only']
     assert not shown['energy'][1].integer_range
@@ -101,8 +98,7 @@ def test_wide_integers(bridge: StartBridge, client: Client, tmp_path: Path) -> N
 
 
 def test_the_bridge(bridge: StartBridge, client: Client) -> None:
-    one = bridge()
-    one.online()
+    bridge().online()
     names = list(client.call('/drive_can_bridge/list_parameters', ListParameters).result.names)
     described = client.call('/drive_can_bridge/describe_parameters', DescribeParameters,
                             DescribeParameters.Request(names=names)).descriptors

@@ -26,8 +26,7 @@ REASONS = {
 def test_a_call_that_asks_for_too_much_is_answered_at_once(
         bridge: StartBridge, client: Client, which: str) -> None:
     names, reason = REASONS[which]
-    one = bridge()
-    one.online()
+    one = bridge().online()
     client.listen()
     before = len(client.logged())
     with one.record() as recorder:
@@ -79,8 +78,7 @@ def test_a_thousand_unknown_names_do_not_fill_the_log(bridge: StartBridge,
 def test_a_thousand_names_that_wait_when_the_bridge_ends_are_told_in_a_sum(
         bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(conveyor={**CONVEYOR, 'missed_limit': 100000,
-                                      'parameter_timeout': 60.0}))
-    one.online()
+                                      'parameter_timeout': 60.0})).online()
     one.played['conveyor'].fault('silent')
     client.listen()
     future = client.ask('/conveyor/get_parameters', GetParameters, GetParameters.Request(

@@ -77,8 +77,7 @@ WRONG = ('__init__(): incompatible constructor arguments. The following argument
 def test_commands_without_a_part_of_the_client_node(
         bridge: StartBridge, run: Run, monkeypatch: pytest.MonkeyPatch,
         members: dict[str, Any], reason: str) -> None:
-    one = bridge(parameters(lift=LIFT))
-    one.online()
+    one = bridge(parameters(lift=LIFT)).online()
     control = one.node.drives['lift'].session.control
     assert control is not None
     with instead(monkeypatch, **members):
@@ -148,8 +147,7 @@ def test_a_bridge_without(
         members: dict[str, Any], rcl: type, warnings: list[Sentence]) -> None:
     monkeypatch.setattr(bridge_node, 'RclServices', rcl)
     with instead(monkeypatch, **members):
-        one = bridge(parameters(lift=LIFT, conveyor=CONVEYOR))
-        one.online()
+        one = bridge(parameters(lift=LIFT, conveyor=CONVEYOR)).online()
         client.listen()
         for said in warnings:
             client.wait_logged(said)

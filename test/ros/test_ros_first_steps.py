@@ -121,8 +121,7 @@ MESSAGE = re.compile(r"  message: '(.*)'")
 def test_each_command_shows_what_the_page_says(bridge: StartBridge, client: Client,
                                                run: Run) -> None:
     text = (ROOT / 'config' / 'demo.yaml').read_text(encoding='utf-8')
-    one = bridge(text.replace('channel: demo', 'channel: ros_test_first_steps'))
-    one.online()
+    bridge(text.replace('channel: demo', 'channel: ros_test_first_steps')).online()
     wait_until(lambda: {'/conveyor', '/lift', '/turntable'} <= set(client.nodes()))
     ros2 = Ros2(client)
     assert len(commands()) > 12
@@ -144,8 +143,7 @@ def test_each_command_shows_what_the_page_says(bridge: StartBridge, client: Clie
 def test_the_node_of_ones_own_moves_the_drive(bridge: StartBridge, client: Client,
                                               monkeypatch: pytest.MonkeyPatch) -> None:
     code, = re.findall(r'```python\n(.*?)```', PAGE, re.DOTALL)
-    one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 2.0}))
-    one.online()
+    one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 2.0})).online()
     setpoint = one.node.drives['conveyor'].session.setpoints.items[0]
     clock = waiting.clock()
     seen: set[int] = set()

@@ -105,8 +105,7 @@ def decoded(bridge: Bridge, path: Path) -> tuple[Tracer, list[Telegram]]:
 
 
 def test_a_drive_that_falls_silent(bridge: StartBridge, tmp_path: Path) -> None:
-    one = bridge(recording(tmp_path, conveyor={**CONVEYOR, **HASTY}))
-    one.online()
+    one = bridge(recording(tmp_path, conveyor={**CONVEYOR, **HASTY})).online()
     wait_until(lambda: one.node.drives['conveyor'].session.statistics.exchanges >= 5)
     one.played['conveyor'].fault('silent')
     path, = wait_until(lambda: traces(tmp_path))
@@ -127,8 +126,7 @@ def test_a_drive_that_falls_silent(bridge: StartBridge, tmp_path: Path) -> None:
 
 
 def test_save_trace(bridge: StartBridge, client: Client, tmp_path: Path) -> None:
-    one = bridge(recording(tmp_path))
-    one.online()
+    bridge(recording(tmp_path)).online()
     answer = client.call('/drive_can_bridge/save_trace', Trigger)
     path, = traces(tmp_path)
     assert (answer.success, answer.message) == (True, str(path))
@@ -138,8 +136,7 @@ def test_save_trace(bridge: StartBridge, client: Client, tmp_path: Path) -> None
 
 def test_whoever_waits_for_a_trace_is_answered_before_the_bridge_is_cleaned_up(
         bridge: StartBridge, client: Client, tmp_path: Path) -> None:
-    one = bridge(recording(tmp_path))
-    one.online()
+    one = bridge(recording(tmp_path)).online()
     future = client.ask('/drive_can_bridge/save_trace', Trigger)
     recorder = one.node._runtime and one.node._runtime._flight
     wait_until(lambda: recorder and recorder._calls == 1)
@@ -154,8 +151,7 @@ def test_whoever_waits_for_a_trace_is_answered_before_the_bridge_is_cleaned_up(
 
 def test_whoever_calls_takes_no_trace_from_a_failure(bridge: StartBridge, client: Client,
                                                      tmp_path: Path) -> None:
-    one = bridge(recording(tmp_path, lift=LIFT))
-    one.online()
+    one = bridge(recording(tmp_path, lift=LIFT)).online()
     assert client.call('/drive_can_bridge/save_trace', Trigger).success
     one.played['lift'].fault('trip')
     # one in 10 s at most, but with what came before the fault
@@ -163,7 +159,6 @@ def test_whoever_calls_takes_no_trace_from_a_failure(bridge: StartBridge, client
 
 
 def test_nothing_is_recorded_unless_asked_for(bridge: StartBridge, client: Client) -> None:
-    one = bridge()
-    one.online()
+    bridge().online()
     answer = client.call('/drive_can_bridge/save_trace', Trigger)
     assert (answer.success, answer.message) == (False, sentences.nothing_recorded())

@@ -5,7 +5,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from bridges import Bridge, CONVEYOR, LIFT, parameters, StartBridge
+from bridges import CONVEYOR, LIFT, parameters, StartBridge
 from by_hand import Run
 import help_examples
 import pytest
@@ -42,14 +42,15 @@ def typed(run: Run, example: str) -> tuple[list[str], str]:
     return lines, errors
 
 
-def online(one: Bridge) -> Bridge:
-    one.online()
-    return one
+def two_cells(bridge: StartBridge) -> None:
+    for cell, drives in (('cell1', {'lift': DRIVE, 'hoist': {**DRIVE, 'station': 3}}),
+                         ('cell2', {'lift': DRIVE})):
+        bridge(parameters(**drives), arguments=('-r', f'__ns:=/{cell}')).online()
 
 
 @pytest.mark.parametrize('example', help_examples.BRIDGE)
 def test_through_a_bridge(bridge: StartBridge, run: Run, place: Path, example: str) -> None:
-    one = online(bridge(parameters(**DRIVES)))
+    one = bridge(parameters(**DRIVES)).online()
     for before in BEFORE.get(example, ()):
         typed(run, before)
     lines, errors = typed(run, example)
@@ -63,16 +64,14 @@ def test_through_a_bridge(bridge: StartBridge, run: Run, place: Path, example: s
 @pytest.mark.parametrize('example', help_examples.CELL)
 def test_through_a_bridge_in_a_namespace(bridge: StartBridge, run: Run, place: Path,
                                          example: str) -> None:
-    online(bridge(parameters(lift=DRIVE), arguments=('-r', '__ns:=/cell1')))
+    bridge(parameters(lift=DRIVE), arguments=('-r', '__ns:=/cell1')).online()
     lines, errors = typed(run, example)
     assert errors == '' and (lines or list(place.glob('backups/*.yaml')))
 
 
 def test_compare_takes_full_names_as_the_others_do(bridge: StartBridge, run: Run,
                                                    place: Path) -> None:
-    online(bridge(parameters(lift=DRIVE, hoist={**DRIVE, 'station': 3}),
-                  arguments=('-r', '__ns:=/cell1')))
-    online(bridge(parameters(lift=DRIVE), arguments=('-r', '__ns:=/cell2')))
+    two_cells(bridge)
     typed(run, 'backup /cell1/lift -o lift.yaml')
     for words in ('lift.yaml /cell1/lift', '/cell1/hoist /cell1/lift', './lift.yaml cell1/hoist',
                   f'{place}/lift.yaml /cell1/lift'):
@@ -88,9 +87,7 @@ def test_compare_takes_full_names_as_the_others_do(bridge: StartBridge, run: Run
 
 
 def test_completion_behind_a_full_name(bridge: StartBridge, run: Run) -> None:
-    online(bridge(parameters(lift=DRIVE, hoist={**DRIVE, 'station': 3}),
-                  arguments=('-r', '__ns:=/cell1')))
-    online(bridge(parameters(lift=DRIVE), arguments=('-r', '__ns:=/cell2')))
+    two_cells(bridge)
 
     def after(*words: str, command: str = 'read') -> list[str]:
         return complete_words(words[-1], Namespace(words=list(words), subcommand=command))

@@ -38,8 +38,7 @@ def test_a_joint_that_turns_on_and_on_begins_again_where_it_was_homed(
              'velocity_command': 'target_velocity'}
     one = bridge(parameters(slide={
         **AXIS, 'homing': True, 'mode': 'csv', 'cyclic_request': ['target_velocity'],
-        'missed_limit': 3, 'joint': joint}))
-    one.online('slide')
+        'missed_limit': 3, 'joint': joint})).online('slide')
     client.listen()
     positions = client.topic('/slide/joint_state', JointState)
     assert client.call('/slide/enable', SetBool, SetBool.Request(data=True)).success

@@ -119,7 +119,6 @@ def test_a_drive_that_answers_none_of_it_is_left_alone(
 
 
 def test_a_profile_without_identity_asks_nothing(bridge: StartBridge, client: Client) -> None:
-    one = bridge()
-    one.online()
+    one = bridge().online()
     assert client.get(BRIDGE, NAME) == ['']
     assert one.node.drives['conveyor'].session.statistics.requests_ok == 0

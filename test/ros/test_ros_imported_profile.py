@@ -37,8 +37,7 @@ def test_bridge_and_simulated_drive_speak_it(bridge: StartBridge, client: Client
     assert '300 of 300 entries' in capsys.readouterr().out
     one = bridge(parameters(conveyor={
         **CONVEYOR, 'profile': str(profile), 'cyclic_request': ['speed_setpoint'],
-        'cyclic_response': ['actual_speed']}))
-    one.online()
+        'cyclic_response': ['actual_speed']})).online()
     names = client.call('/conveyor/list_parameters', ListParameters).result.names
     assert len(names) == 300
     assert {'rampenzeit', 'einstellung_0', 'einstellung_296'} <= set(names)

@@ -36,8 +36,7 @@ def run(capsys: pytest.CaptureFixture[str]) -> Run:
 
 def enabled(bridge: StartBridge, run: Run, **keys: Any) -> Any:
     """Return a bridge whose lift is enabled."""
-    one = bridge(parameters(lift={**DRIVE, **keys}))
-    one.online()
+    one = bridge(parameters(lift={**DRIVE, **keys})).online()
     assert run('enable', 'lift')[0] == 0
     return one
 
@@ -127,8 +126,7 @@ def test_bad_input(bridge: StartBridge, run: Run, words: tuple[str, ...], code: 
 
 
 def test_what_is_not_enabled_is_refused(bridge: StartBridge, run: Run) -> None:
-    one = bridge(parameters(lift=DRIVE))
-    one.online()
+    bridge(parameters(lift=DRIVE)).online()
     assert run('jog', 'lift', '300', '--yes')[::2] == (
         1, 'lift: is disabled: drive_can enable lift\n')
 
@@ -140,8 +138,7 @@ def test_what_is_not_enabled_is_refused(bridge: StartBridge, run: Run) -> None:
 ])
 def test_what_jog_must_not_move(bridge: StartBridge, run: Run, keys: dict[str, Any],
                                 words: tuple[str, ...], said: str) -> None:
-    one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 2.0, **keys}))
-    one.online()
+    bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 2.0, **keys})).online()
     code, lines, errors = run('jog', 'conveyor', *words, '--yes')
     assert (code, lines) == (1, []) and said in errors
 
@@ -151,8 +148,7 @@ def test_a_position_is_not_for_jog(bridge: StartBridge, run: Run) -> None:
             'profile': 'datamodel_axis_example', 'cyclic_request': ['position_setpoint'],
             'cyclic_response': ['actual_position', 'status_word'], 'command_timeout': 2.0,
             'missed_limit': 100, 'parameter_timeout': 2.0, 'control_timeout': 20.0}
-    one = bridge(parameters(axis=axis))
-    one.online()
+    one = bridge(parameters(axis=axis)).online()
     assert run('enable', 'axis')[0] == 0
     where = one.played['axis'].value('actual_position')
     code, lines, errors = run('jog', 'axis', 'position_setpoint', '5', '--yes')

@@ -52,8 +52,7 @@ def speeds(one: Bridge) -> dict[str, int]:
 
 
 def test_all_joints_in_the_order_of_the_drives(bridge: StartBridge, client: Client) -> None:
-    one = bridge(two())
-    one.online()
+    one = bridge(two()).online()
     for name, speed, position in (('west', 600.0, 90.0), ('east', 1.0, 45.0)):
         one.played[name].set_value('actual_speed', speed)
         one.played[name].set_value('actual_position', position)
@@ -137,8 +136,7 @@ def test_the_stamp_is_that_of_the_oldest_sample(bridge: StartBridge, client: Cli
     """A drive that answers no more, but is not given up yet, makes the whole message old."""
     content = two()
     content['drives'][name]['missed_limit'] = 1000
-    one = bridge(content)
-    one.online()
+    one = bridge(content).online()
     topic = client.topic(STATES, JointState)
     topic.wait()
     one.played[name].fault('silent')
@@ -157,17 +155,15 @@ def test_the_stamp_is_that_of_the_oldest_sample(bridge: StartBridge, client: Cli
 
 
 def test_empty_without_anybody_who_has_it(bridge: StartBridge, client: Client) -> None:
-    one = bridge(parameters(
+    bridge(parameters(
         left=wheel(1, {'name': 'l', 'velocity': 'actual_speed'}),
-        right=wheel(2, {'name': 'r', 'velocity': 'actual_speed'})))
-    one.online()
+        right=wheel(2, {'name': 'r', 'velocity': 'actual_speed'}))).online()
     message = client.topic(STATES, JointState).wait(lambda m: len(m.name) == 2)
     assert (len(message.position), len(message.velocity), len(message.effort)) == (0, 2, 0)
 
 
 def test_rate_and_quality(bridge: StartBridge, client: Client) -> None:
-    one = bridge(two(joint_state_rate=20.0))
-    one.online()
+    bridge(two(joint_state_rate=20.0)).online()
     topic = client.topic(STATES, JointState)
     (info,) = client.node.get_publishers_info_by_topic(STATES)
     assert info.qos_profile.reliability is ReliabilityPolicy.RELIABLE
@@ -180,8 +176,7 @@ def test_rate_and_quality(bridge: StartBridge, client: Client) -> None:
 @pytest.mark.parametrize('content', [
     two(joint_state_rate=0.0), parameters(conveyor=CONVEYOR)], ids=['rate 0', 'no joint'])
 def test_there_is_none(bridge: StartBridge, client: Client, content: dict[str, Any]) -> None:
-    one = bridge(content)
-    one.online()
+    one = bridge(content).online()
     client.find(one.node, 'drive_can_bridge')
     assert not client.node.count_publishers(STATES)
     joints = any('joint' in drive for drive in content['drives'].values())
@@ -189,8 +184,7 @@ def test_there_is_none(bridge: StartBridge, client: Client, content: dict[str, A
 
 
 def test_commands_for_all_of_them(bridge: StartBridge, client: Client) -> None:
-    one = bridge(two())
-    one.online()
+    one = bridge(two()).online()
     names = ['nj', 'wj', 'sj']
 
     def send(*velocity: float, **kinds: list[float]) -> None:
@@ -216,8 +210,7 @@ def test_commands_for_all_of_them(bridge: StartBridge, client: Client) -> None:
 def test_a_defect_of_one_drive_costs_no_other(bridge: StartBridge, client: Client,
                                               monkeypatch: pytest.MonkeyPatch) -> None:
     """Whichever drive of a bus has its turn takes the message, for all of them."""
-    one = bridge(two())
-    one.online()
+    one = bridge(two()).online()
     client.listen()
     names = ['ej', 'wj', 'sj']
     client.publish(COMMANDS, JointState(name=names, velocity=[0.0] * 3))
@@ -240,8 +233,7 @@ def test_a_defect_of_one_drive_costs_no_other(bridge: StartBridge, client: Clien
 @pytest.mark.interpreted    # replaces a method
 def test_a_drive_that_begins_anew_behind_a_defect_costs_no_other_its_command(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    one = bridge(two())
-    one.online()
+    one = bridge(two()).online()
     names = ['ej', 'sj']
     client.publish(COMMANDS, JointState(name=names, velocity=[0.0, 0.0]))
     wait_until(lambda: one.node.drives['south'].session.setpoints.items[0].armed)
@@ -271,8 +263,7 @@ def test_a_drive_that_begins_anew_behind_a_defect_costs_no_other_its_command(
 
 def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
         bridge: StartBridge, client: Client) -> None:
-    one = bridge(two())
-    one.online()
+    one = bridge(two()).online()
     client.publish(COMMANDS, JointState(name=['wj'], velocity=[0.0]))
     wait_until(lambda: one.node.drives['west'].session.setpoints.items[0].armed)
     exchange = one.node.exchanges['main']
@@ -290,8 +281,7 @@ def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
 
 
 def test_array_of_another_length_is_refused_whole(bridge: StartBridge, client: Client) -> None:
-    one = bridge(two())
-    one.online()
+    one = bridge(two()).online()
     client.listen()
     client.publish(COMMANDS, JointState(name=['wj', 'nj'], velocity=[0.0, 0.0]))
     wait_until(lambda: one.node.drives['north'].session.setpoints.items[0].armed)
@@ -315,8 +305,7 @@ def test_array_of_another_length_is_refused_whole(bridge: StartBridge, client: C
     ids=['twice in the end', 'all alike'])
 def test_more_names_than_anybody_has_are_refused_whole(bridge: StartBridge, client: Client,
                                                        names: list[str]) -> None:
-    one = bridge(two())
-    one.online()
+    one = bridge(two()).online()
     client.listen()
     client.publish(COMMANDS, JointState(name=names))
     client.wait_logged(f'command on {COMMANDS} cannot be read: {len(names)} names, at most 1000 '
@@ -330,8 +319,7 @@ def test_more_names_than_anybody_has_are_refused_whole(bridge: StartBridge, clie
 
 
 def test_joints_of_others_are_told_once(bridge: StartBridge, client: Client) -> None:
-    one = bridge(two())
-    one.online()
+    one = bridge(two()).online()
     client.listen()
     for _ in range(3):
         client.publish(COMMANDS, JointState(name=['head', 'wj'], velocity=[1.0, 0.0]))
@@ -342,8 +330,7 @@ def test_joints_of_others_are_told_once(bridge: StartBridge, client: Client) -> 
 
 
 def test_quantity_without_a_command(bridge: StartBridge, client: Client) -> None:
-    one = bridge(two())
-    one.online()
+    one = bridge(two()).online()
     client.listen()
     client.publish(COMMANDS, JointState(name=['wj', 'nj'], velocity=[0.0, 0.0],
                                         position=[1.0, math.nan]))
@@ -355,8 +342,7 @@ def test_quantity_without_a_command(bridge: StartBridge, client: Client) -> None
 
 def test_it_matches_a_queue_of_one(bridge: StartBridge, client: Client) -> None:
     """Reliable or best effort, any depth: the hardware interface asks for a depth of 1."""
-    one = bridge(two())
-    one.online()
+    bridge(two()).online()
     for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
         publisher = client.node.create_publisher(
             JointState, COMMANDS, QoSProfile(depth=1, reliability=reliability))
@@ -365,8 +351,7 @@ def test_it_matches_a_queue_of_one(bridge: StartBridge, client: Client) -> None:
 
 
 def test_cleaned_up_and_configured_anew(bridge: StartBridge, client: Client) -> None:
-    one = bridge(two())
-    one.online()
+    one = bridge(two()).online()
     topic = client.topic(STATES, JointState)
     topic.wait(lambda m: len(m.name) == 3)
     for label in ('deactivate', 'cleanup'):

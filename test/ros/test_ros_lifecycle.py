@@ -163,8 +163,7 @@ def test_a_failing_part_leaves_nothing_behind(bridge: StartBridge, client: Clien
 @pytest.mark.parametrize('transition', [DEACTIVATE, ACTIVE_SHUTDOWN])
 def test_stopping_sends_neutral_cycles(bridge: StartBridge, client: Client,
                                        transition: int) -> None:
-    one = bridge(parameters(conveyor=CONVEYOR, lift=LIFT))
-    one.online()
+    one = bridge(parameters(conveyor=CONVEYOR, lift=LIFT)).online()
     with one.record() as recorder:
         client.publish('/conveyor/command/speed_setpoint', Float64(data=0.0))
         client.publish('/conveyor/command/speed_setpoint', Float64(data=100.0))
@@ -206,8 +205,7 @@ def test_drives_that_run_when_activate_fails_are_stopped(
 def test_callers_are_answered_before_a_drive_goes(bridge: StartBridge, client: Client,
                                                   steps: tuple[int, ...]) -> None:
     one = bridge(parameters(conveyor={**CONVEYOR, 'missed_limit': 100000,
-                                      'parameter_timeout': 60.0}))
-    one.online()
+                                      'parameter_timeout': 60.0})).online()
     one.played['conveyor'].fault('silent')
     futures = [client.ask('/conveyor/get_parameters', GetParameters,
                           GetParameters.Request(names=['ramp_time'])) for _ in range(10)]
@@ -358,8 +356,7 @@ class _Taken:
 
 def test_the_end_stops_drives_whatever_a_transition_is_at(bridge: StartBridge, client: Client,
                                                           ) -> None:
-    one = bridge()
-    one.online()
+    one = bridge().online()
     with one.record() as recorder:
         client.publish('/conveyor/command/speed_setpoint', Float64(data=0.0))
         client.publish('/conveyor/command/speed_setpoint', Float64(data=100.0))

@@ -55,8 +55,7 @@ def test_ros_is_not_needed_where_all_are_here(
 
 def test_the_log_says_whose_process_asked_for_what(
         bridge: StartBridge, client: Client, run: Run, locally: Lines) -> None:
-    one = bridge(parameters(lift=LIFT))
-    one.online()
+    one = bridge(parameters(lift=LIFT)).online()
     locally(one)
     for command, action in (('enable', 'enable'), ('stop', 'quick stop'),
                             ('disable', 'disable'), ('reset', 'reset fault')):
@@ -90,8 +89,7 @@ def test_other_domains_are_stopped_too_unless_something_is_named(
 
 def test_where_only_other_domains_have_bridges_it_is_said_that_this_one_has_none(
         bridge: StartBridge, run: Run, locally: Lines, monkeypatch: pytest.MonkeyPatch) -> None:
-    there = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/b'))
-    there.online()
+    there = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/b')).online()
     domain = there.context.get_domain_id()
     locally(there)
     monkeypatch.setenv('ROS_DOMAIN_ID', str(domain + 1))
@@ -109,8 +107,7 @@ def test_where_only_other_domains_have_bridges_it_is_said_that_this_one_has_none
 
 def test_one_that_hangs_is_named_after_a_second(
         bridge: StartBridge, run: Run, locally: Lines, bench: Any) -> None:
-    one = bridge(parameters(lift=LIFT))
-    one.online()
+    one = bridge(parameters(lift=LIFT)).online()
     domain = one.context.get_domain_id()
     hung, elsewhere = Presence(domain, '/b/bridge'), Presence(domain + 1, '/c/bridge')
     locally(one, hung=('/b/bridge', '/c/bridge'))
@@ -135,8 +132,7 @@ def test_one_that_hangs_is_named_after_a_second(
 @pytest.fixture
 def hung(bridge: StartBridge, locally: Lines) -> Iterator[str]:
     """Have two bridges on this host, of which one hangs; what is said of that."""
-    one = bridge(parameters(lift=LIFT))
-    one.online()
+    one = bridge(parameters(lift=LIFT)).online()
     presence = Presence(one.context.get_domain_id(), '/b/bridge')
     locally(one, hung=('/b/bridge',))
     yield (f'b/bridge: NOT STOPPED: this bridge of this host (process {os.getpid()}) does not '
@@ -179,8 +175,7 @@ def test_whatever_keeps_ros_from_beginning_what_is_known_without_is_told(
         error: Exception, why: str) -> None:
     def no_way(*_: Any) -> Any:
         raise error
-    one = bridge(parameters(lift=LIFT))
-    one.online()
+    one = bridge(parameters(lift=LIFT)).online()
     older = Presence(one.context.get_domain_id(), '/b/bridge')
     locally(one)
     monkeypatch.setattr(hand, '_ros', no_way)
@@ -205,8 +200,7 @@ def test_where_the_way_through_ros_fails_midway_what_is_known_without_is_told(
             raise RuntimeError('rcl')
 
         answers = look
-    one = bridge(parameters(lift=LIFT))
-    one.online()
+    one = bridge(parameters(lift=LIFT)).online()
     older = Presence(one.context.get_domain_id(), '/b/bridge')
     locally(one)
     node = SimpleNamespace(leave=lambda: None)

@@ -15,8 +15,7 @@ LIFT_STATUS = 'drive_can_bridge: drive lift'
 
 def test_a_defect_counts_as_one_loss_and_a_stop_that_was_asked_for_as_none(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    one = bridge(parameters(lift={**LIFT, 'missed_limit': 10}))
-    one.online()
+    one = bridge(parameters(lift={**LIFT, 'missed_limit': 10})).online()
     lift = one.node.drives['lift']
     assert lift.times_lost == 0
 

@@ -25,8 +25,7 @@ def own_nodes(client: Client) -> set[str]:
 
 @pytest.mark.parametrize('argument', ['__ns:=/cell1', 'drive_can_bridge:__ns:=/cell1'])
 def test_namespace(bridge: StartBridge, client: Client, argument: str) -> None:
-    one = bridge(arguments=('-r', argument))
-    one.online()
+    one = bridge(arguments=('-r', argument)).online()
     wait_until(lambda: own_nodes(client) == {'/cell1/drive_can_bridge', '/cell1/conveyor'})
     response = client.topic('/cell1/conveyor/response', ParameterEvent).wait()
     assert response.node == '/cell1/conveyor'
@@ -47,8 +46,7 @@ def test_namespace(bridge: StartBridge, client: Client, argument: str) -> None:
 
 
 def test_the_bridge_can_be_called_something_else(bridge: StartBridge, client: Client) -> None:
-    one = bridge(arguments=('-r', '__node:=x', '-r', '__ns:=/cell2'), key='/**/x')
-    one.online()
+    bridge(arguments=('-r', '__node:=x', '-r', '__ns:=/cell2'), key='/**/x').online()
     wait_until(lambda: own_nodes(client) == {'/cell2/x', '/cell2/conveyor'})
     client.diagnostics('cell2/x: drive conveyor')
     assert client.get('/cell2/x', 'drives.conveyor.station') == [1]
@@ -67,8 +65,7 @@ def test_topics_and_services_of_a_drive_are_remapped(bridge: StartBridge,
     one = bridge(parameters(conveyor=CONVEYOR, lift=LIFT), arguments=(
         '-r', 'conveyor:~/actual_speed:=/belt/speed',
         '-r', '/conveyor/command/speed_setpoint:=/belt/setpoint',
-        '-r', 'lift:~/enable:=/lift_on'))
-    one.online()
+        '-r', 'lift:~/enable:=/lift_on')).online()
     client.topic('/belt/speed', Float64).wait()
     client.publisher('/belt/setpoint', Float64, host='/conveyor')
     with one.record() as recorder:
@@ -113,8 +110,7 @@ def test_every_quality_can_be_overridden(bridge: StartBridge, client: Client, ke
                  for kind, topics in EVERYTHING.items() for topic in topics}
     overrides['/diagnostics'] = {'publisher': changes['publisher']}
     one = bridge({**parameters(conveyor={**CONVEYOR, 'joint': joint}),
-                  'qos_overrides': overrides}, key=key)
-    one.online()
+                  'qos_overrides': overrides}, key=key).online()
     node = client.node
     client.find(one.node, 'conveyor', 'drive_can_bridge')
     for topic in (*(f'/conveyor/{name}' for name in EVERYTHING['publisher']), '/diagnostics'):

@@ -156,8 +156,7 @@ def test_rubbish_is_answered(shared_bridge: StartBridge, client: Client, name: s
 
 
 def test_dynamic_ones_take_effect(bridge: StartBridge, client: Client) -> None:
-    one = bridge()
-    one.online()
+    one = bridge().online()
     session = one.node.drives['conveyor'].session
     assert client.set(BRIDGE, drives__conveyor__command_timeout=4,
                       drives__conveyor__parameter_timeout=0.05,

@@ -53,8 +53,7 @@ def test_two_hundred_names(bridge: StartBridge, client: Client, tmp_path: Path, 
     one = bridge(parameters(conveyor={
         **CONVEYOR, 'protocol': protocol, 'profile': str(profile), 'period': 0.1,
         'cyclic_request': ['word' if extra else 'value_300'],
-        'cyclic_response': ['answer' if extra else 'value_301']}))
-    one.online()
+        'cyclic_response': ['answer' if extra else 'value_301']})).online()
     wanted = range(302, 502)
     for number in wanted:
         one.played['conveyor'].set_value(f'value_{number}', number)
@@ -71,8 +70,7 @@ def test_two_hundred_names(bridge: StartBridge, client: Client, tmp_path: Path, 
 
 def test_busy(bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(conveyor={**CONVEYOR, 'missed_limit': 1000,
-                                      'parameter_timeout': 30.0, 'parameter_retries': 0}))
-    one.online()
+                                      'parameter_timeout': 30.0, 'parameter_retries': 0})).online()
     one.played['conveyor'].fault('silent')
     service = client.service('/conveyor/set_parameters', SetParameters)
     answered: list[int] = []
@@ -99,8 +97,7 @@ def test_busy(bridge: StartBridge, client: Client) -> None:
 def test_a_slow_drive_delays_no_other(bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(
         conveyor={**CONVEYOR, 'missed_limit': 100000, 'parameter_timeout': 10.0},
-        lift=LIFT))
-    one.online()
+        lift=LIFT)).online()
     one.played['conveyor'].fault('silent')
     slow = client.ask('/conveyor/get_parameters', GetParameters,
                       GetParameters.Request(names=['ramp_time']))

@@ -11,8 +11,7 @@ SPEED_RANGE = '0 to 3000 rpm'
 
 
 def test_a_failure_that_repeats_is_logged_once(bridge: StartBridge, client: Client) -> None:
-    one = bridge(parameters(conveyor={**CONVEYOR, **HASTY}))
-    one.online()
+    bridge(parameters(conveyor={**CONVEYOR, **HASTY})).online()
     client.listen()
     text = 'conveyor: read p35 (P35): no answer in 0.2 s, 3 attempts'
     for _ in range(3):
@@ -27,8 +26,7 @@ def test_a_failure_that_repeats_is_logged_once(bridge: StartBridge, client: Clie
 
 
 def test_set_refusals(bridge: StartBridge, client: Client) -> None:
-    one = bridge()
-    one.online()
+    one = bridge().online()
     client.listen()
     with one.record() as recorder:
         results = client.set(
@@ -60,8 +58,7 @@ def test_set_refusals(bridge: StartBridge, client: Client) -> None:
 
 def test_of_two_values_for_one_parameter_none_is_set_atomically(
         bridge: StartBridge, client: Client) -> None:
-    one = bridge()
-    one.online()
+    one = bridge().online()
     before = one.played['conveyor'].value('ramp_time')
     with one.record() as recorder:
         assert client.set_atomically('/conveyor', ramp_time=before + 1.0, p30=150) == (

@@ -46,8 +46,7 @@ class Far:
 @pytest.fixture
 def here(bridge: StartBridge) -> Bridge:
     """Start a bridge of this host."""
-    one = bridge(parameters(lift=LIFT))
-    one.online()
+    one = bridge(parameters(lift=LIFT)).online()
     return one
 
 

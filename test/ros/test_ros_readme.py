@@ -31,8 +31,7 @@ def test_each_command_does_what_it_says(
     monkeypatch.chdir(tmp_path)
     Path('my_drives.yaml').write_text(text, encoding='utf-8')
     assert main(['validate', 'my_drives.yaml']) == 0
-    one = bridge(text.replace('socketcan, channel: can0', 'virtual, channel: readme'))
-    one.online()
+    one = bridge(text.replace('socketcan, channel: can0', 'virtual, channel: readme')).online()
     plant = one.played['axis']
     fastest = 0.0
 

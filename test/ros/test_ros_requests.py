@@ -67,8 +67,7 @@ def _slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Slow]:
 
 
 def _start(bridge: StartBridge) -> Bridge:
-    one = bridge(parameters(conveyor=CONVEYOR, lift=LIFT))
-    one.online()
+    one = bridge(parameters(conveyor=CONVEYOR, lift=LIFT)).online()
     return one
 
 

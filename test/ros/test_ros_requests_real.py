@@ -53,8 +53,7 @@ def test_what_a_cpp_exception_does(how: str) -> None:
 
 @pytest.mark.real
 def test_a_hundred_thousand_names_are_refused(bridge: StartBridge, client: Client) -> None:
-    one = bridge()
-    one.online()
+    bridge().online()
     count = 100_000
     names = ['x'] * count
     values = client.call('/conveyor/get_parameters', GetParameters,

@@ -165,8 +165,7 @@ def wanted(goal: dict[str, float], name: str) -> int:
 def arm(bridge: StartBridge, client: Client, request: pytest.FixtureRequest) -> Iterator[Arm]:
     """Return the arm, online and disabled, standing where nobody would guess."""
     one = bridge(content('arm'), arguments=REMAPS,
-                 mechanics=dict.fromkeys(AXES, getattr(request, 'param', MECHANICS)))
-    one.online()
+                 mechanics=dict.fromkeys(AXES, getattr(request, 'param', MECHANICS))).online()
     manager = Manager(client, 'arm')
     with one.record() as recorder:
         try:
@@ -343,8 +342,7 @@ def test_rearm_stays_neutral(arm: Arm) -> None:
 
 def test_base_with_wheels(bridge: StartBridge, client: Client) -> None:
     """Velocity interfaces: both wheels forward, of which one is mounted the other way."""
-    one = bridge(content('base'), arguments=REMAPS)
-    one.online()
+    one = bridge(content('base'), arguments=REMAPS).online()
     manager = Manager(client, 'base')
     try:
         for name in ('left_wheel', 'right_wheel'):

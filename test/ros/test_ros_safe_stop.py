@@ -25,8 +25,7 @@ LIFTS = parameters(lift=LIFT)
 
 def run(bridge: StartBridge, client: Client, content: Any = LIFTS) -> Bridge:
     """Return a bridge with an enabled lift that moves."""
-    one = bridge(content)
-    one.online()
+    one = bridge(content).online()
     assert client.call('/lift/enable', SetBool, SetBool.Request(data=True)).success
     for value in (0.0, 100.0):
         client.publish('/lift/command/speed_setpoint', Float64(data=value))

@@ -20,8 +20,7 @@ NUMERIC = {'std_msgs/msg/Float64', 'std_msgs/msg/Int64', 'std_msgs/msg/Bool'}
 def _topics(bridge: StartBridge, client: Client) -> dict[str, str]:
     """Return the types of all topics of the demo, by name."""
     text = (CONFIG / 'demo.yaml').read_text(encoding='utf-8')
-    one = bridge(text.replace('channel: demo', 'channel: ros_test_layouts'))
-    one.online()
+    one = bridge(text.replace('channel: demo', 'channel: ros_test_layouts')).online()
     client.find(one.node, *one.node.drives)
     return {name: types[0] for drive in one.node.drives
             for name, types in client.node.get_publisher_names_and_types_by_node(drive, '/')}

@@ -28,8 +28,7 @@ def test_a_lost_drive_leaves_no_sample_behind(bridge: StartBridge) -> None:
 
 
 def test_every_parameter_once_per_exchange(bridge: StartBridge, client: Client) -> None:
-    one = bridge(parameters(conveyor={**CONVEYOR, 'missed_limit': 25}))
-    one.online()
+    one = bridge(parameters(conveyor={**CONVEYOR, 'missed_limit': 25})).online()
     values = [client.topic('/conveyor/actual_speed', Float64),
               client.topic('/conveyor/motor_current', Float64),
               client.topic('/conveyor/status_word', Int64)]
@@ -105,8 +104,7 @@ def test_a_truncated_response_publishes_what_arrived(bridge: StartBridge,
                                                      client: Client) -> None:
     one = bridge(parameters(conveyor={
         **CONVEYOR, 'joint': {'name': 'belt', 'velocity': 'actual_speed',
-                              'effort': 'motor_current'}}))
-    one.online()
+                              'effort': 'motor_current'}})).online()
     speed = client.topic('/conveyor/actual_speed', Float64)
     word = client.topic('/conveyor/status_word', Int64)
     ready = client.latched('/conveyor/status_word/ready', Bool)

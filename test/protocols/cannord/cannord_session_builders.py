@@ -64,8 +64,7 @@ def inverter(**options: Any) -> DriveConfiguration:
 def started(**options: Any) -> Conversation:
     """Return a conversation whose first cycle is due at 10 s."""
     talk = Conversation(inverter(**options))
-    assert talk.bus_up(9.0) == []
-    assert talk.activate(10.0) == []
+    assert talk.begins() == []
     assert talk.session.next_timer() == 10.0
     return talk
 

@@ -418,8 +418,7 @@ def test_raw_names_of_listed_parameters_obey_their_rules() -> None:
 
 def monitored(**options: Any) -> tuple[Conversation, list[str]]:
     talk = Conversation(inverter(table=(FREQUENCY, ACTUAL, MONITORING), **options))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     talk.at(10.0)
     return talk, talk.hears('003#310B0000', 10.002)
 

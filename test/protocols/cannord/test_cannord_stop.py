@@ -200,8 +200,7 @@ def test_a_drive_that_drops_out_by_itself_is_neutral_at_once() -> None:
 def test_a_drive_that_comes_and_goes_is_asked_once_for_its_time_out() -> None:
     """It answers every fourth cycle, and no parameters: whoever reads waits for one task only."""
     talk = Conversation(inverter(table=(FREQUENCY, ACTUAL, MONITORING, OFFSET), missed_limit=3))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     talk.at(10.0)
     tasks = [(10.002, text) for text in talk.hears(READY, 10.002)]
     assert tasks == [(10.002, '202#0112000000000000')]

@@ -88,8 +88,7 @@ def configuration(**options: Any) -> DriveConfiguration:
 def started(**options: Any) -> Conversation:
     """Return a conversation whose first round is due at 10.05 s."""
     talk = Conversation(configuration(**options))
-    assert talk.bus_up(9.0) == []
-    assert talk.activate(10.0) == ([START] if options.get('nmt_start', True) else [])
+    assert talk.begins() == ([START] if options.get('nmt_start', True) else [])
     return talk
 
 

@@ -31,8 +31,7 @@ class Device:
         self.node.operational = True
         self.free, self.latency = 0.0, 0.001
         self.line = Timeline(self.talk, self.answer)
-        self.talk.bus_up(9.0)
-        self.talk.activate(10.0)
+        self.talk.begins()
         self.asks(15.5, ControlAction.ENABLE)
         self.line.live(20.0)
         assert self.talk.session.control is not None

@@ -119,11 +119,12 @@ class Axis:
             self.deliver(self.talk.at(self.now))
         raise AssertionError('the timer spins')
 
-    def start(self) -> None:
+    def start(self) -> 'Axis':
         """Activate, and let it come online."""
         self.deliver(self.talk.bus_up(self.now))
         self.deliver(self.talk.activate(self.now))
         self.live(0.3)
+        return self
 
     def online(self) -> 'Axis':
         """Be online, with nothing in the log."""

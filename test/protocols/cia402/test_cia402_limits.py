@@ -41,8 +41,7 @@ class TestObjects:
     @pytest.mark.parametrize('make', [AcceptsAnything, ChecksMapping])
     @pytest.mark.parametrize('mapping', ['configure', 'verify'])
     def test_one_that_the_drive_lacks(self, make: Any, mapping: str) -> None:
-        axis = limited(make, None, mapping=mapping)
-        axis.start()
+        axis = limited(make, None, mapping=mapping).start()
         axis.live(3.0)
         assert found_differing(axis) == says(
             'of_object', what='torque_limit (6072h.00h)', why=says('no_such_object'))
@@ -70,8 +69,7 @@ class TestObjects:
         assert not axis.session.error
 
     def test_assume_does_not_look(self) -> None:
-        axis = limited(AcceptsAnything, None, mapping='assume')
-        axis.start()
+        axis = limited(AcceptsAnything, None, mapping='assume').start()
         assert READ not in axis.take()
 
     @pytest.mark.parametrize(('make', 'fits'), [(AcceptsAnything, False), (FourBytes, True)])

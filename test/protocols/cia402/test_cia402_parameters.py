@@ -159,8 +159,7 @@ def test_together_or_not_at_all(axis: Axis) -> None:
 
 
 def test_parameters_of_a_drive_that_differs(axis: Axis) -> None:
-    axis = Axis(objects={**OBJECTS, (0x1019, 0): b'\5'}, table=LISTED)
-    axis.start()
+    axis = Axis(objects={**OBJECTS, (0x1019, 0): b'\5'}, table=LISTED).start()
     assert outcomes(axis, read(BYTE)) == [0x80]
 
 

@@ -581,8 +581,7 @@ class TestByMeaning:
     @pytest.mark.parametrize('make', [SignedLengths, EightEntries])
     @pytest.mark.parametrize('mapping', ['configure', 'verify'])
     def test_what_fits_is_cycled_and_not_written(self, make: Any, mapping: str) -> None:
-        axis = Axis(make=make, objects=FITS, mapping=mapping)
-        axis.start()
+        axis = Axis(make=make, objects=FITS, mapping=mapping).start()
         assert axis.session.online, axis.session.offline_advice
         assert not any(text[2:4] in ('16', '1A') for text in written(axis))
 
@@ -590,15 +589,13 @@ class TestByMeaning:
     def test_what_does_not_fit_is_written(self, make: Any) -> None:
         axis = Axis(make=make, objects={
             **FITS, (0x1600, 2): bytes.fromhex('20007A60'), (0x1600, 3): bytes.fromhex('08006060'),
-            (0x1600, 0): b'\3'})
-        axis.start()
+            (0x1600, 0): b'\3'}).start()
         assert axis.session.online, axis.session.offline_advice
         assert axis.drive.mapped(0x1600) == [(0x6040, 0, 2), (0x60FF, 0, 4)]
 
     def test_what_is_behind_and_not_empty_differs(self) -> None:
         axis = Axis(make=EightEntries, mapping='verify', objects={
-            **FITS, (0x1600, 5): bytes.fromhex('08006060')})
-        axis.start()
+            **FITS, (0x1600, 5): bytes.fromhex('08006060')}).start()
         assert differs(axis) == says('object_differs', what='1600h.00h')
 
     def test_an_entry_that_cannot_be_read_is_no_empty_one(self) -> None:

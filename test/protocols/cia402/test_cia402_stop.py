@@ -185,8 +185,7 @@ class TestFoundEnabled:
     @pytest.mark.parametrize(('option', 'word'), [
         ('disable_operation', '0700'), ('shutdown', '0600'), ('disable_voltage', '0000')])
     def test_it_is_disabled_by_sdo_before_anything_else(self, option: str, word: str) -> None:
-        axis = self.meet(disable_word=option)
-        axis.start()
+        axis = self.meet(disable_word=option).start()
         sent = [text for text in axis.take() if text.startswith(('605#', '000#', '205#'))]
         assert sent[:3] == ['605#4041600000000000', f'605#2B406000{word}0000',
                             '605#4041600000000000']
@@ -378,8 +377,7 @@ class TestLosses:
             assert axis.session.state is DriveState.DISABLED, again
 
     def test_one_that_never_had_any_is_online_and_says_so(self) -> None:
-        axis = Axis(heartbeat_producer=0.0)
-        axis.start()
+        axis = Axis(heartbeat_producer=0.0).start()
         assert axis.session.warning == says('heartbeat_missing')
         axis.says('705#00')
         axis.live(1.5)

@@ -43,11 +43,12 @@ class Bus:
         self.events[session.configuration.name] += session.take_events()
         self.due[place] = session.next_timer()
 
-    def start(self, *places: int) -> None:
+    def start(self, *places: int) -> 'Bus':
         for place in places or range(len(self.sessions)):
             self.sessions[place].bus_up(self.now)
             self.sessions[place].activate(self.now)
             self.pump(place)
+        return self
 
     def live(self, duration: float) -> None:
         end = self.now + duration
@@ -100,8 +101,7 @@ def online(of: Bus) -> list[bool]:
 class TestRounds:
 
     def test_all_rpdos_then_sync_once_a_period(self) -> None:
-        one = bus()
-        one.start()
+        one = bus().start()
         one.live(0.5)
         assert online(one) == [True] * 3
         one.rounds()
@@ -112,8 +112,7 @@ class TestRounds:
         assert {round(later - at, 5) for at, later in zip(syncs, syncs[1:])} == {0.01}
 
     def test_one_that_comes_later_joins(self) -> None:
-        one = bus()
-        one.start(0, 2)
+        one = bus().start(0, 2)
         one.live(0.5)
         one.rounds()
         one.start(1)
@@ -125,8 +124,7 @@ class TestRounds:
         assert {each[0] for each in rounds} == {'201'}
 
     def test_one_that_is_lost_leaves_the_others_in_peace(self) -> None:
-        one = bus()
-        one.start()
+        one = bus().start()
         one.live(0.5)
         takes, one.drives[3].takes = one.drives[3].takes, lambda sent: []  # type: ignore
         one.rounds()
@@ -140,8 +138,7 @@ class TestRounds:
         assert online(one) == [True] * 3
 
     def test_a_stop_waits_for_the_next_sync_in_time(self) -> None:
-        one = bus(period=0.02)
-        one.start()
+        one = bus(period=0.02).start()
         one.live(0.5)
         one.asks(1, ControlAction.ENABLE)
         one.live(0.5)
@@ -155,8 +152,7 @@ class TestRounds:
     # s; the longest wait is 0.02 s
     @pytest.mark.parametrize(('period', 'since_the_last'), [(0.2, 0.1), (0.05, 0.01)])
     def test_or_brings_a_whole_round_forward(self, period: float, since_the_last: float) -> None:
-        one = bus(period=period)
-        one.start()
+        one = bus(period=period).start()
         one.live(2.0)
         for place in (0, 1, 2):
             one.asks(place, ControlAction.ENABLE)
@@ -182,8 +178,7 @@ class TestRounds:
     @pytest.mark.parametrize('period', [0.5, 2.0])
     def test_cycles_of_a_stop_are_close_together_however_long_the_period_is(
             self, period: float) -> None:
-        one = bus(2, period=period, control_timeout=0.5)
-        one.start()
+        one = bus(2, period=period, control_timeout=0.5).start()
         one.live(3 * period)
         assert online(one) == [True] * 2
         one.log.clear()
@@ -199,8 +194,7 @@ class TestRounds:
 
     @pytest.mark.parametrize('period', [0.01, 0.5, 2.0])
     def test_drives_that_fall_silent_together_get_theirs_as_soon(self, period: float) -> None:
-        one = bus(2, period=period, control_timeout=0.5)
-        one.start()
+        one = bus(2, period=period, control_timeout=0.5).start()
         one.live(3 * period + 0.5)
         for place in (0, 1):
             one.asks(place, ControlAction.ENABLE)
@@ -226,8 +220,7 @@ class TestRounds:
 
     @pytest.mark.parametrize('place', [0, 1])
     def test_one_that_is_lost_when_another_one_stops(self, place: int) -> None:
-        one = bus(period=0.5)
-        one.start()
+        one = bus(period=0.5).start()
         one.live(2.2)
         one.drives[3].takes = lambda sent: []   # type: ignore[method-assign]
         one.live(0.6)
@@ -239,8 +232,7 @@ class TestRounds:
         self.rpdos_and_sync_are_together(one)
 
     def test_one_that_restarts_in_the_middle_of_a_round_that_it_has_brought_forward(self) -> None:
-        one = bus(2, period=0.2)
-        one.start()
+        one = bus(2, period=0.2).start()
         one.live(1.3)
         one.asks(1, ControlAction.ENABLE)
         one.live(1.02)
@@ -266,8 +258,7 @@ class TestRounds:
 
     @pytest.mark.parametrize('place', [0, 1, 2])
     def test_so_are_those_of_one_drive_and_all_others_come_along(self, place: int) -> None:
-        one = bus(period=0.5)
-        one.start()
+        one = bus(period=0.5).start()
         one.live(2.2)
         one.asks(place, ControlAction.ENABLE)
         one.live(3.0)
@@ -292,8 +283,7 @@ class TestRounds:
 
     def test_nor_does_one_that_is_lost_bring_a_round_of_its_own(self) -> None:
         """The last of a round."""
-        one = bus(2, period=0.5)
-        one.start()
+        one = bus(2, period=0.5).start()
         one.live(2.0)
         one.drives[2].takes = lambda sent: []   # type: ignore[method-assign]
         one.log.clear()
@@ -304,8 +294,7 @@ class TestRounds:
 
     def test_a_round_brought_forward_costs_no_axis_its_answer(self) -> None:
         """TPDOs come 8 ms behind SYNC, as on a slow bus, and a quick stop 2 ms behind it."""
-        one = bus(period=0.1, missed_limit=1)
-        one.start()
+        one = bus(period=0.1, missed_limit=1).start()
         one.live(2.0)
         for place in (0, 1, 2):
             one.asks(place, ControlAction.ENABLE)
@@ -325,8 +314,7 @@ class TestRounds:
 
     def test_a_process_that_is_late_between_two_drives(self) -> None:
         """One leaves a cycle out, the other does not: they stay in step all the same."""
-        one = bus()
-        one.start()
+        one = bus().start()
         one.live(0.5)
         one.rounds()
         act, delays = one.sessions[0].handle_timer, [0.0149, 0.0151, 0.0049, 0.0051]
@@ -364,8 +352,7 @@ class TestRounds:
 
     def test_one_heartbeat_for_all_the_smallest(self) -> None:
         one = Bus(*(servo('pv', name=f'axis_{station}', station=station, bridge_heartbeat=beat)
-                    for station, beat in ((1, 0.5), (2, 0.1), (3, 0.3))))
-        one.start()
+                    for station, beat in ((1, 0.5), (2, 0.1), (3, 0.3)))).start()
         one.live(2.0)
         beats = [at for at, text in one.log if text == '77F#05']
         assert {round(later - at, 3) for at, later in zip(beats, beats[1:])} == {0.1}
@@ -375,8 +362,7 @@ class TestRounds:
     def test_it_beats_as_the_node_that_those_know_who_are_to_hear_it(self) -> None:
         one = Bus(*(servo('pv', name=f'axis_{station}', station=station, bridge_heartbeat=beat,
                           bridge_node=node)
-                    for station, beat, node in ((1, 0.0, 100), (2, 0.1, 126))))
-        one.start()
+                    for station, beat, node in ((1, 0.0, 100), (2, 0.1, 126)))).start()
         one.live(1.0)
         assert {text for _, text in one.log if text.endswith('#05')} == {'77E#05'}
         assert one.drives[2].number(0x1016, 1) == 126 << 16 | 300
@@ -414,8 +400,7 @@ class TestTheFirst:
         assert online(one) == [True, False, True]
 
     def test_it_does_not_pause_when_all_are_lost_and_found(self) -> None:
-        one = bus()
-        one.start()
+        one = bus().start()
         one.live(0.5)
         for drive in one.drives.values():
             drive.operational = False
@@ -426,8 +411,7 @@ class TestTheFirst:
         assert min(later - at for at, later in zip(syncs, syncs[1:])) > 0.005
 
     def test_they_end_together(self) -> None:
-        one = bus()
-        one.start()
+        one = bus().start()
         one.live(0.5)
         one.log.clear()
         for place, session in enumerate(one.sessions):

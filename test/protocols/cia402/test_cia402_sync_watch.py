@@ -32,8 +32,7 @@ class TestWatched:
 
     @pytest.mark.parametrize('mode', ['csv', 'pv'])
     def test_one_that_is_found_with_the_error_comes_online(self, mode: str) -> None:
-        axis = Axis(mode, make=WatchesSync)
-        axis.start()
+        axis = Axis(mode, make=WatchesSync).start()
         assert axis.session.online
         assert gaps(axis) == {0.01}
         assert sent(axis).index('080#') < sent(axis).index('000#0105')
@@ -70,8 +69,7 @@ class TestWatched:
         assert axis.session.online
 
     def test_it_is_told_once(self) -> None:
-        axis = Axis(make=WatchesSync, objects={(0x1006, 0): bytes((1, 0, 0, 0))})
-        axis.start()
+        axis = Axis(make=WatchesSync, objects={(0x1006, 0): bytes((1, 0, 0, 0))}).start()
         axis.now += 0.05
         axis.live(2.5)
         assert axis.session.online
@@ -95,8 +93,7 @@ class TestWatched:
 class TestBetweenRounds:
 
     def test_one_a_period_from_the_first_answer_to_the_last_stop_frame(self) -> None:
-        axis = Axis('pv', period=0.02)
-        axis.start()
+        axis = Axis('pv', period=0.02).start()
         axis.asks(ControlAction.ENABLE)
         axis.drive.operational = False      # so that it is lost, and found
         axis.says('705#7F')
@@ -110,8 +107,7 @@ class TestBetweenRounds:
         assert times(axis, '080#')[-1] == last
 
     def test_it_goes_on_while_a_drive_differs(self) -> None:
-        axis = Axis(objects={(0x6502, 0): bytes(4)})
-        axis.start()
+        axis = Axis(objects={(0x6502, 0): bytes(4)}).start()
         axis.live(2.0)
         assert len(times(axis, '080#')) > 200
 
@@ -143,15 +139,13 @@ class TestBetweenRounds:
 
     def test_none_by_event(self) -> None:
         axis = Axis('pv', transmission='event', objects={
-            (0x1800, 3): bytes(2), (0x1800, 5): bytes(2)})
-        axis.start()
+            (0x1800, 3): bytes(2), (0x1800, 5): bytes(2)}).start()
         axis.live(2.0)
         assert '080#' not in axis.take()
 
     def test_around_an_nmt_start_while_nobody_is_heard(self) -> None:
         """It has waited for an encoder, without a heartbeat, for longer than a second."""
-        axis = Axis('pv', **MUTE)
-        axis.start()
+        axis = Axis('pv', **MUTE).start()
         assert sent(axis).index('080#') < sent(axis).index('000#0105')
 
 
@@ -230,8 +224,7 @@ class TestStartsSlowly:
     @pytest.mark.parametrize('beats', [True, False])
     @pytest.mark.parametrize('mode', ['csv', 'pv'])
     def test_it_comes_online(self, mode: str, beats: bool) -> None:
-        axis = Axis(mode, make=StartsSlowly, **({} if beats else MUTE))
-        axis.start()
+        axis = Axis(mode, make=StartsSlowly, **({} if beats else MUTE)).start()
         axis.live(0.5)
         assert axis.session.online
         assert len(times(axis, '000#0105')) == len(times(axis, '000#8005')) == 1
@@ -261,8 +254,7 @@ class TestStartsSlowly:
         assert axis.session.offline_advice == says('node_state', state='pre-operational')
 
     def test_started_again_behind_a_boot_up(self) -> None:
-        axis = Axis('pv', make=StartsSlowly)
-        axis.start()
+        axis = Axis('pv', make=StartsSlowly).start()
         for each in axis.drive.restarts():
             axis.says(str(each))
         axis.live(1.0)

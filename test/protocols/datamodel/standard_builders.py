@@ -17,8 +17,7 @@ LIMIT_ZERO = '3F1#0633000000000000'
 def polling(**options: Any) -> Conversation:
     """Return a conversation whose first round was begun at 10 s."""
     talk = Conversation(drive('datamodel_standard', **options))
-    assert talk.bus_up(9.0) == []
-    assert talk.activate(10.0) == []
+    assert talk.begins() == []
     assert talk.at(10.0) == [ASK]
     return talk
 

@@ -33,8 +33,7 @@ def running(**options: object) -> Conversation:
     talk = Conversation(drive(
         'datamodel_standard', table=BLIND_TABLE, rearm_immediate=True, command_timeout=0.0,
         **{'request': (BLIND_SPEED,), **options}))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     talk.served(10.03, well)
     talk.commands(0, 100.0, 10.03)
     talk.served(10.055, well)

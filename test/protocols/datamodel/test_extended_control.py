@@ -111,8 +111,7 @@ def test_drive_whose_status_is_missing_for_long_is_not_driven_on() -> None:
 
 def test_disable_is_written_as_soon_as_the_drive_is_found_each_time() -> None:
     talk = Conversation(drive(control=CONTROL))
-    talk.bus_up(9.0)
-    talk.activate(9.998)
+    talk.begins(9.998)
     checked(talk, 9.998)
     assert talk.at(10.0) == [NEUTRAL]
     assert talk.hears(READY, 10.002) == [DISABLE]
@@ -398,8 +397,7 @@ def test_nor_does_a_status_by_number_where_cycles_hold_the_word(action: ControlA
     status = [0.03, '10200D31#0001000000000000']
     line = Timeline(talk, lambda text: (0.002, '103FFFF0#03E800FA00000000') if (
         text.startswith('003FFFF0')) else tuple(status) if text == ASK_STATUS else None)
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     line.plan(10.3, partial(talk.asks, ControlAction.ENABLE))
     line.live(10.35)
     status[1] = '10200D31#0003000000000000'

@@ -37,8 +37,7 @@ def test_age_of_a_frame_counts_for_stamp_and_latency_only() -> None:
 
 def test_unasked_answer_before_the_first_cycle() -> None:
     talk = Conversation(drive())
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     talk.hears(ANSWER, 10.0005)
     assert talk.events() == [FrameRejected(says('unasked', what='cyclic response'))]
     assert not talk.session.online
@@ -83,8 +82,7 @@ def test_after_a_response_without_a_whole_word_the_real_one_may_still_come() -> 
 
 def test_strict_policy_holds_for_acyclic_answers_too() -> None:
     talk = Conversation(drive(length_policy='strict'))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     assert talk.hears('102007A4#00320033000000', 10.001) == []
     assert len(talk.events(FrameRejected)) == 1
     assert talk.hears(REQUEST_MAP, 10.002) == [ASK_RESPONSE_MAP]
@@ -102,8 +100,7 @@ def test_strict_policy_holds_for_acyclic_answers_too() -> None:
 
 def test_drive_without_mapped_response_is_online_when_it_answers() -> None:
     talk = Conversation(drive(response=()))
-    talk.bus_up(9.0)
-    talk.activate(9.998)
+    talk.begins(9.998)
     checked(talk, 9.998)
     talk.at(10.0)
     talk.hears('103FFFF0#', 10.001)
@@ -113,8 +110,7 @@ def test_drive_without_mapped_response_is_online_when_it_answers() -> None:
 
 def test_drive_without_setpoints_is_polled_and_never_unarmed() -> None:
     talk = Conversation(drive(request=()))
-    talk.bus_up(9.0)
-    talk.activate(9.998)
+    talk.begins(9.998)
     talk.hears(f'102007A4#{ZEROS}', 9.999)
     talk.hears(RESPONSE_MAP, 10.0)
     assert talk.at(10.0) == [NEUTRAL]
@@ -166,8 +162,7 @@ def test_what_nobody_asked_for_is_counted_and_leaves_no_trace(text: str) -> None
 ])
 def test_answer_that_does_not_match_the_question(text: str) -> None:
     talk = Conversation(drive())
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     assert talk.hears(text, 10.001) == []
     assert talk.session.statistics.rejected == 1
     assert talk.hears(REQUEST_MAP, 10.002) == [ASK_RESPONSE_MAP]

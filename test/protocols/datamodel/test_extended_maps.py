@@ -23,8 +23,7 @@ WELL = {NEUTRAL: ANSWER, ASK_REQUEST_MAP: REQUEST_MAP, ASK_RESPONSE_MAP: RESPONS
 def asked(**options: object) -> Conversation:
     """Return a conversation that asked for the request map at 10 s."""
     talk = Conversation(drive(**options))
-    talk.bus_up(9.0)
-    assert talk.activate(10.0) == [ASK_REQUEST_MAP]
+    assert talk.begins() == [ASK_REQUEST_MAP]
     return talk
 
 
@@ -181,8 +180,7 @@ def test_difference_is_believed_although_the_rest_is_not_answered() -> None:
 def test_bases_and_offset() -> None:
     talk = Conversation(drive(request_map_base=300, response_map_base=500, parameter_offset=-1,
                               request=(SPEED,), response=(ACTUAL,)))
-    talk.bus_up(9.0)
-    assert talk.activate(10.0) == [f'002012B4#{ZEROS}']                     # 299
+    assert talk.begins() == [f'002012B4#{ZEROS}']                     # 299
     assert talk.hears('102012B4#0031000000000000', 10.001) == [f'00201F34#{ZEROS}']   # 49; 499
     talk.hears('10201F34#00D0000000000000', 10.002)                         # 208
     assert talk.at(10.002) == [NEUTRAL]
@@ -199,8 +197,7 @@ def test_offset_moves_parameters() -> None:
 
 def test_assume_never_looks() -> None:
     talk = Conversation(drive(mapping='assume'))
-    talk.bus_up(9.0)
-    assert talk.activate(10.0) == []
+    assert talk.begins() == []
     sent = talk.until(14.0)
     assert {text for _, text in sent} == {NEUTRAL}
     assert [now for now, _ in sent] == [round(10 + 0.02 * step, 6) for step in range(201)]
@@ -255,8 +252,7 @@ class MapKeeper:
 
 def configured(keeper: MapKeeper) -> Conversation:
     talk = Conversation(drive(mapping='configure', response=(ACTUAL,)))
-    talk.bus_up(9.0)
-    keeper.serve(talk, talk.activate(10.0), 10.0)
+    keeper.serve(talk, talk.begins(), 10.0)
     return talk
 
 
@@ -293,8 +289,7 @@ def test_configure_leaves_right_maps_alone() -> None:
 def test_configure_without_setpoints_switches_the_request_map_off() -> None:
     keeper = MapKeeper(50, 51, 0, 0, 209, 0, 0, 0)
     talk = Conversation(drive(mapping='configure', request=(), response=(ACTUAL,)))
-    talk.bus_up(9.0)
-    keeper.serve(talk, talk.activate(10.0), 10.0)
+    keeper.serve(talk, talk.begins(), 10.0)
     keeper.live(talk, 10.2)
     assert [keeper.registers[number] for number in range(122, 130)] == [0, 0, 0, 0, 209, 0, 0, 0]
 

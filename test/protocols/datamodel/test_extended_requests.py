@@ -65,8 +65,7 @@ def test_time_out(retries: int, timeout: float, text: str) -> None:
 
 def test_offline_drive_that_answers_anyway() -> None:
     talk = Conversation(drive(parameter_retries=0, mapping='assume', period=10.0))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     talk.at(10.0)
     talk.submits(read(GAIN, RAMP), 16.0)
     assert talk.hears('102001E1#0005000000000000', 16.001) == [ASK_GAIN]
@@ -242,8 +241,7 @@ def test_one_alone_is_written_like_any_other() -> None:
 
 def test_moved_maps_are_guarded_too() -> None:
     talk = Conversation(drive(request_map_base=300, response_map_base=310, parameter_offset=-1))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     refused = [number for number in range(100, 400) if talk.session.services.write_refusal(
         parameter(f'p{number}', number, listed=False))]
     assert refused == [300, 301, 302, 303, 310, 311, 312, 313]

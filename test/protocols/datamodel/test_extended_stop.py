@@ -46,8 +46,7 @@ def test_drive_that_never_answered_is_stopped_too() -> None:
 
 def test_nothing_is_sent_to_a_drive_whose_maps_are_not_known() -> None:
     talk = Conversation(drive())
-    talk.bus_up(9.0)
-    assert talk.activate(10.0) == [ASK_REQUEST_MAP]
+    assert talk.begins() == [ASK_REQUEST_MAP]
     assert talk.deactivate(10.05) == []
     silent(talk, 10.06)
     # the answer comes late

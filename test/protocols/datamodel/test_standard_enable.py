@@ -26,8 +26,7 @@ def found(until: float, *, parameter_timeout: float) -> Timeline:
         'datamodel_standard', control=CONTROL, request=(SPEED, LIMIT, WORD), period=0.05,
         refresh_interval=0.0, parameter_timeout=parameter_timeout))
     line = Timeline(talk, {ASK: (0.002, ANSWER)}.get)
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     line.live(until)
     return line
 
@@ -90,8 +89,7 @@ class Enabled:
             response=response, refresh_interval=0.5, parameter_timeout=0.1))
         self.line = Timeline(self.talk, self.answer)
         self.enabled = False
-        self.talk.bus_up(9.0)
-        self.talk.activate(10.0)
+        self.talk.begins()
         self.line.live(10.2)
         self.line.took(self.talk.asks(ControlAction.ENABLE, 10.2))
 

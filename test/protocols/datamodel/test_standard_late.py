@@ -140,8 +140,7 @@ def test_no_answer_is_ever_taken_for_another(
 def test_a_drive_that_is_always_150_ms_late_is_offline_and_nothing_is_published() -> None:
     talk = Conversation(drive('datamodel_standard', request=()))
     line = Timeline(talk, lambda text: (0.15, '7F1#0000000000000000'))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     line.live(60.0)
     assert talk.samples() == []
     assert not talk.session.online

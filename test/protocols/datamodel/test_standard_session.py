@@ -164,8 +164,7 @@ def test_a_gap_is_bridged_over_listed_parameters() -> None:
 
 def polling_of(**options: object) -> list[str]:
     talk = Conversation(drive('datamodel_standard', **options))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     return talk.at(10.0)
 
 
@@ -486,8 +485,7 @@ def test_nor_does_it_where_the_status_is_read_by_hand() -> None:
     ask_status, off, on = '3F1#03D3000100000000', '7F1#0100000000000000', '7F1#0300000000000000'
     answers = {'3F1#03D1000200000000': (0.001, ANSWER), ask_status: (0.01, off)}
     line = Timeline(talk, answers.get)
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     line.live(10.3)
     line.plan(10.3, partial(talk.asks, ControlAction.ENABLE))
     line.live(10.35)
@@ -620,8 +618,7 @@ def test_a_stop_does_not_wait_for_the_status(action: ControlAction, word: str,
 def test_addresses_with_other_bases() -> None:
     talk = Conversation(drive(
         'datamodel_standard', station=20, request_id_base=0x300, response_id_base=0x380))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     assert talk.at(10.0) == ['314#03D1000300000000']
     talk.hears('394#E803FA0001000000', 10.002)
     assert talk.samples() == [(1000, 250, 1)]
@@ -629,8 +626,7 @@ def test_addresses_with_other_bases() -> None:
 
 def test_an_offset_moves_every_number() -> None:
     talk = Conversation(drive('datamodel_standard', parameter_offset=-1))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     assert talk.at(10.0) == ['3F1#03D0000300000000']
     talk.hears(ANSWER, 10.002)
     assert [text for _, text in talk.until(10.01)] == [

@@ -50,8 +50,7 @@ def lost(word: Parameter = WORD, *, end: float = 12.0, **options: object) -> Con
     talk = Conversation(drive(
         'datamodel_standard', response=(GAIN, ACTUAL, CURRENT, STATUS), rearm_immediate=True,
         command_timeout=0.0, period=0.1, table=table, **options))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
+    talk.begins()
     talk.served(10.09, well(1).get)
     assert talk.session.online
     if talk.session.control is not None:
