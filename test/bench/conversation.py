@@ -2,9 +2,11 @@
 """A session that is spoken to in hex and literal times."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from builders import frame, text_of
+from coming import Coming
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
@@ -52,13 +54,7 @@ class Conversation:
 
     def until(self, end: float) -> list[tuple[float, str]]:
         """Serve every timer up to and including ``end``, each at its own time."""
-        found = []
-        for _ in range(10000):
-            due = self.session.next_timer()
-            if due > end:
-                return found
-            found += [(round(due, 6), text) for text in self.at(due)]
-        raise AssertionError(f'the timer spins at {due}')
+        return self.served(end, lambda text: None)
 
     def hears(self, text: str, now: float) -> list[str]:
         """Receive a frame."""
@@ -75,21 +71,20 @@ class Conversation:
         :param delay: s until it arrives. What has not arrived by the end does not.
         """
         found: list[tuple[float, str]] = []
-        coming: list[tuple[float, str]] = []
-        while True:
-            due = self.session.next_timer()
-            if coming and coming[0][0] <= min(due, end):
-                now, reply = coming.pop(0)
-                sent = self.hears(reply, now)
-            elif due <= end:
-                now, sent = due, self.at(due)
-            else:
-                return found
+        coming = Coming()
+
+        def took(sent: list[str]) -> None:
             for text in sent:
-                found.append((round(now, 6), text))
-                reply_to = answer(text)
-                if reply_to is not None:
-                    coming.append((now + delay, reply_to))
+                found.append((round(self.now, 6), text))
+                reply = answer(text)
+                if reply is not None:
+                    coming.plan(self.now + delay, partial(arrives, reply))
+
+        def arrives(reply: str) -> None:
+            took(self.hears(reply, self.now))
+        coming.live(self, end, due=self.session.next_timer,
+                    timers=lambda: took(self.at(self.now)))
+        return found
 
     def bus_up(self, now: float) -> list[str]:
         self.now = now

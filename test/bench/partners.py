@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A session and the drive at the other end of its bus, of each family: the table PARTNERS."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
@@ -11,6 +11,7 @@ from conversation import Conversation
 from drives import (
     CannordDrive, ExtendedDrive, Motor, PkwNode, ServoDrive, StandardDrive,
 )
+from timeline import Pair
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
@@ -18,11 +19,8 @@ from drive_can_bridge.core.events import DriveState, Noted
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 
-#: s between a request and its answer
-DELAY = 0.0005
 
-
-class Partner(ABC):
+class Partner(Pair):
     """
     The drive at the other end of the bus: registers, and the family's telegrams.
 
@@ -43,12 +41,9 @@ class Partner(ABC):
 
     def __init__(self, **options: Any) -> None:
         self.configuration = self.configure(**options)
-        self.talk = Conversation(self.configuration)
-        self.now = 10.0
-        self.mute = False
+        super().__init__(Conversation(self.configuration))
         self.registers = {parameter.number or 0: 0 for parameter in TABLE}
         self.registers.update({209: 1000, 210: 250, 211: 1})
-        self.frames: list[tuple[float, str]] = []
 
     @abstractmethod
     def configure(self, **options: Any) -> DriveConfiguration:
@@ -72,30 +67,10 @@ class Partner(ABC):
     def setpoints(self, sent: str) -> list[int]:
         """Return the raw setpoints that a frame carries; none if it carries none."""
 
-    def enable(self) -> None:  # noqa: B027  most have none
+    def enable(self) -> None:
         """Bring a drive that has a control word so far that it takes setpoints."""
 
     # -- the bus ----------------------------------------------------------------------------------
-
-    def deliver(self, sent: list[str]) -> None:
-        for text in sent:
-            self.frames.append((self.now, text))
-            answers = [] if self.mute else self.answers(text)
-            for answer in answers:
-                self.now += DELAY
-                self.deliver(self.talk.hears(answer, self.now))
-
-    def live(self, duration: float) -> None:
-        """Let time pass, every timer in time."""
-        end = self.now + duration
-        for _ in range(100_000):
-            due = self.talk.session.next_timer()
-            if due > end:
-                self.now = max(self.now, end)
-                return
-            self.now = max(self.now, due)
-            self.deliver(self.talk.at(self.now))
-        raise AssertionError('the timer spins')
 
     def reads(self, *parameters: Parameter) -> None:
         """Have parameters read."""
@@ -107,15 +82,14 @@ class Partner(ABC):
             write(*((self.own(parameter), raw) for parameter, raw in items)), self.now))
 
     def start(self) -> 'Partner':
-        self.deliver(self.talk.bus_up(self.now))
-        self.deliver(self.talk.activate(self.now))
+        self.activate()
         self.live(0.2)
         return self
 
     def take(self) -> list[tuple[float, str]]:
         """Return the frames sent since the last call."""
-        frames, self.frames = self.frames, []
-        return frames
+        log, self.log = self.log, []
+        return log
 
     def commanded(self) -> Iterator[int]:
         """Return the raw speed setpoints sent since the last call."""
@@ -279,8 +253,7 @@ PARTNERS: dict[str, type[Partner]] = {
 
 def run(partner: Partner) -> None:
     """Have the drive run."""
-    partner.talk.commands(0, 0.0, partner.now)
-    partner.talk.commands(0, 100.0, partner.now)
+    partner.commands(0.0, 100.0)
     partner.live(0.1)
     assert partner.registers[50] == 1000
     partner.talk.events()

@@ -39,7 +39,7 @@ from typing import Any
 from builders import frame
 from drives import Motor, PkwNode, ServoDrive, StandardDrive
 from kinds import KINDS, PERIOD
-from timeline import Coming
+from coming import Coming
 
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import Noted, StationFound, StationLost

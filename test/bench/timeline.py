@@ -1,65 +1,15 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Simulated time: all timers of a session, answers that take a while, and what users do."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
-import heapq
-from itertools import count
-from typing import Protocol
 
+from coming import Coming
 from conversation import Conversation
 
-#: steps of a while: what takes more does not end
-STEPS_MAX = 20_000
+from drive_can_bridge.core.session import Session
 
-
-class Timed(Protocol):
-    """What has a time of its own (s)."""
-
-    now: float
-
-
-class Coming:
-    """What is on its way: what happens, and when."""
-
-    def __init__(self) -> None:
-        self._steps: list[tuple[float, int, Callable[[], object]]] = []
-        self._number = count()
-
-    def __bool__(self) -> bool:
-        return bool(self._steps)
-
-    def plan(self, at: float, step: Callable[[], object]) -> None:
-        heapq.heappush(self._steps, (at, next(self._number), step))
-
-    def clear(self) -> None:
-        self._steps.clear()
-
-    def arrives(self) -> None:
-        """Let the first of it happen, whatever the time is."""
-        heapq.heappop(self._steps)[2]()
-
-    def live(self, of: Timed, end: float, *, due: Callable[[], float],
-             timers: Callable[[], object], then: Callable[[], object] = lambda: None) -> None:
-        """
-        Let time pass: what arrives goes before timers of the same moment.
-
-        :param of: has the time; what is on its way at the end arrives later.
-        :param due: says when the next timer is due, which ``timers`` then serves.
-        :param then: called behind everything that happens.
-        """
-        for _ in range(STEPS_MAX):
-            timer_at = max(of.now, due())
-            if self._steps and self._steps[0][0] <= min(timer_at, end):
-                of.now = max(of.now, self._steps[0][0])
-                self.arrives()
-            elif timer_at <= end:
-                of.now = timer_at
-                timers()
-            else:
-                return
-            then()
-        raise AssertionError('a timer is never done')
 
 
 class Timeline:
@@ -101,3 +51,66 @@ class Timeline:
     def when(self, *texts: str) -> list[float]:
         """Return when any of these frames was sent."""
         return [at for at, text in self.log if text in texts]
+
+
+class Pair(ABC):
+    """
+    A session and the drive at the other end of its bus, which answers at once.
+
+    :cvar DELAY: s between a request and its answer.
+    :ivar log: what was sent, and when.
+    :ivar deaf: nothing of what the drive is told arrives.
+    :ivar mute: nothing of what it says arrives.
+    """
+
+    DELAY = 0.0005
+
+    def __init__(self, talk: Conversation) -> None:
+        self.talk = talk
+        self.now = 10.0
+        self.log: list[tuple[float, str]] = []
+        self.deaf = self.mute = False
+
+    @property
+    def session(self) -> Session:
+        return self.talk.session
+
+    @abstractmethod
+    def answers(self, sent: str) -> list[str]:
+        """Do what the drive does with a frame; return what it answers."""
+
+    def deliver(self, sent: list[str]) -> None:
+        for text in sent:
+            self.log.append((round(self.now, 6), text))
+            answers = [] if self.deaf else self.answers(text)
+            for answer in answers if not self.mute else ():
+                self.now += self.DELAY
+                self.deliver(self.talk.hears(answer, self.now))
+
+    def due(self) -> float:
+        """Return when the next timer is due."""
+        return self.session.next_timer()
+
+    def timers(self) -> None:
+        self.deliver(self.talk.at(self.now))
+
+    def live(self, duration: float) -> None:
+        """Let time pass, every timer in time."""
+        end = self.now + duration
+        Coming().live(self, end, due=self.due, timers=self.timers)
+        self.now = max(self.now, end)
+
+    def activate(self) -> None:
+        self.deliver(self.talk.bus_up(self.now))
+        self.deliver(self.talk.activate(self.now))
+
+    def ends(self, wait: float | None = None) -> None:
+        """Deactivate; it has stopped in time."""
+        self.deliver(self.talk.deactivate(self.now))
+        self.live(self.session.longest_stop + 0.5 if wait is None else wait)
+        assert self.session.stopped
+
+    def commands(self, *values: float) -> None:
+        """Give the first setpoint these values, one after the other."""
+        for value in values:
+            self.talk.commands(0, value, self.now)

@@ -17,7 +17,7 @@ from extent import some
 import kinds
 import pytest
 from stops import UNANSWERED_CYCLES
-from timeline import Coming
+from coming import Coming
 
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import AnswerLate, Event, FrameRejected, Noted

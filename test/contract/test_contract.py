@@ -11,7 +11,7 @@ import math
 from builders import (
     ACTUAL, DAMPING, GAIN, LIMIT, ORDER, RAMP, read, SPEED, text_of, write,
 )
-from partners import DELAY, Partner, PARTNERS, run, warnings, worries
+from partners import Partner, PARTNERS, run, warnings, worries
 import pytest
 from saying import may_run, says
 
@@ -77,7 +77,7 @@ def test_online_is_told_before_the_first_sample(make: type[Partner]) -> None:
 
 def test_silent_drive_is_not_online(make: type[Partner]) -> None:
     partner = make()
-    partner.mute = True
+    partner.deaf = True
     partner.start()
     partner.live(3.0)
     session = partner.talk.session
@@ -90,13 +90,13 @@ def test_silent_drive_is_not_online(make: type[Partner]) -> None:
 
 
 def test_loss_and_recovery(partner: Partner) -> None:
-    partner.mute = True
+    partner.deaf = True
     partner.live(1.0)
     lost, = partner.talk.events(StationLost)
     assert lost.reason
     assert not partner.talk.session.online
     assert partner.talk.session.statistics.missed >= 3
-    partner.mute = False
+    partner.deaf = False
     partner.live(2.0)
     assert partner.talk.session.online
     assert len(partner.talk.events(StationFound)) == 1
@@ -104,15 +104,15 @@ def test_loss_and_recovery(partner: Partner) -> None:
 
 def test_an_answer_that_is_not_wanted_any_more_is_not_rejected(partner: Partner) -> None:
     """It was asked for, and comes in time: the bridge has ended meanwhile."""
-    partner.mute = True
+    partner.deaf = True
     partner.reads(RAMP)
     while not (asked := [text for _, text in partner.take() if not partner.setpoints(text)]):
         partner.live(0.005)
     answers = partner.answers(asked[-1])
     assert answers
     partner.deliver(partner.talk.deactivate(partner.now))
-    partner.mute = False
-    partner.now += DELAY
+    partner.deaf = False
+    partner.now += partner.DELAY
     for answer in answers:
         partner.deliver(partner.talk.hears(answer, partner.now))
     partner.live(1.0)
@@ -122,12 +122,10 @@ def test_an_answer_that_is_not_wanted_any_more_is_not_rejected(partner: Partner)
 
 
 def test_deactivation_ends_neutral_and_then_silent(partner: Partner) -> None:
-    partner.talk.commands(0, 0.0, partner.now)
-    partner.talk.commands(0, 100.0, partner.now)
+    partner.commands(0.0, 100.0)
     partner.live(0.1)
     assert list(partner.commanded())[-1] == 1000
-    partner.deliver(partner.talk.deactivate(partner.now))
-    partner.live(1.0)
+    partner.ends(1.0)
     assert set(partner.commanded()) == {0}
     session = partner.talk.session
     assert session.stopped
@@ -139,10 +137,8 @@ def test_deactivation_ends_neutral_and_then_silent(partner: Partner) -> None:
 
 
 def test_deactivation_of_a_drive_that_stopped_answering(partner: Partner) -> None:
-    partner.mute = True
-    partner.deliver(partner.talk.deactivate(partner.now))
-    partner.live(2.0)   # NMT may have stopped the node: it is told for a second
-    assert partner.talk.session.stopped
+    partner.deaf = True
+    partner.ends(2.0)
     assert set(partner.commanded()) <= {0}
 
 
@@ -162,9 +158,7 @@ def test_stop_right_after_a_stall(partner: Partner) -> None:
     run(partner)
     partner.now += 1.5
     partner.deliver(partner.talk.time_lost(partner.now))
-    partner.deliver(partner.talk.deactivate(partner.now))
-    partner.live(1.0)
-    assert partner.talk.session.stopped
+    partner.ends(1.0)
     assert partner.registers[50] == 0
     assert not worries(partner)
 
@@ -175,9 +169,7 @@ def test_stop_right_after_the_bus_came_back(partner: Partner) -> None:
     assert worries(partner)
     partner.now += 1.5
     partner.deliver(partner.talk.bus_up(partner.now))
-    partner.deliver(partner.talk.deactivate(partner.now))
-    partner.live(1.0)
-    assert partner.talk.session.stopped
+    partner.ends(1.0)
     assert partner.registers[50] == 0
     assert not worries(partner)
 
@@ -203,14 +195,12 @@ def test_end_while_the_bus_is_lost_is_told(partner: Partner) -> None:
 def test_a_stop_that_the_drive_did_not_hear_is_told(partner: Partner) -> None:
     """What was told to stand still when it had fallen silent already may not have heard it."""
     run(partner)
-    partner.mute = True
+    partner.deaf = True
     partner.talk.commands(0, 0.0, partner.now)
     partner.live(2.0)
     assert partner.registers[50] == 1000
     assert not partner.talk.session.online
-    partner.deliver(partner.talk.deactivate(partner.now))
-    partner.live(2.0)
-    assert partner.talk.session.stopped
+    partner.ends(2.0)
     assert worries(partner)
 
 
@@ -219,12 +209,10 @@ def test_a_drive_that_is_silent_when_the_bridge_ends_is_told(make: type[Partner]
     partner = make(missed_limit=100).start()
     partner.enable()
     run(partner)
-    partner.mute = True
+    partner.deaf = True
     partner.live(2.5 * partner.configuration.period)
     assert partner.talk.session.online
-    partner.deliver(partner.talk.deactivate(partner.now))
-    partner.live(3.0)
-    assert partner.talk.session.stopped
+    partner.ends(3.0)
     assert partner.registers[50] == 1000
     assert worries(partner)
 
@@ -242,13 +230,11 @@ def test_stop_frames_that_the_bus_refuses_are_no_stop(partner: Partner) -> None:
 
 
 def test_nobody_is_warned_of_a_drive_that_was_never_told_to_run(partner: Partner) -> None:
-    partner.mute = True
+    partner.deaf = True
     partner.talk.bus_down(partner.now)
     partner.deliver(partner.talk.bus_up(partner.now))
     partner.live(0.2)
-    partner.deliver(partner.talk.deactivate(partner.now))
-    partner.live(2.0)
-    assert partner.talk.session.stopped
+    partner.ends(2.0)
     told = bool(worries(partner))
     assert told is (partner.idle is DriveState.DISABLED)    # that one was told to enable
 
@@ -270,9 +256,7 @@ def test_acknowledged_or_not_a_refused_write_is_not_sent(make: type[Partner]) ->
 
 def test_life_can_be_repeated(partner: Partner) -> None:
     for _ in range(3):
-        partner.deliver(partner.talk.deactivate(partner.now))
-        partner.live(1.0)
-        assert partner.talk.session.stopped
+        partner.ends(1.0)
         partner.deliver(partner.talk.activate(partner.now))
         partner.live(1.0)
         assert partner.talk.session.online
@@ -316,8 +300,7 @@ def test_immediate(make: type[Partner]) -> None:
 
 
 def test_silence_of_the_commander_is_neutral(partner: Partner) -> None:
-    partner.talk.commands(0, 0.0, partner.now)
-    partner.talk.commands(0, 100.0, partner.now)
+    partner.commands(0.0, 100.0)
     partner.live(1.0)
     assert list(partner.commanded())[-1] == 0
     assert partner.talk.events(SetpointsExpired) == [SetpointsExpired(('speed_setpoint',))]
@@ -350,10 +333,10 @@ def test_after_an_upset_it_wants_arming_again(partner: Partner, upset: str) -> N
     partner.live(0.1)
     partner.take()
     if upset == 'loss':
-        partner.mute = True
+        partner.deaf = True
         partner.live(0.2)
         partner.take()  # until the loss was noticed, the command was still in force
-        partner.mute = False
+        partner.deaf = False
     elif upset == 'bus':
         talk.bus_down(partner.now)
         partner.deliver(talk.bus_up(partner.now))
@@ -371,8 +354,7 @@ def test_after_an_upset_it_wants_arming_again(partner: Partner, upset: str) -> N
 
 @pytest.mark.parametrize('value', [math.nan, math.inf, 3000.1, 1e300, True])
 def test_bad_commands_are_refused(partner: Partner, value: float) -> None:
-    partner.talk.commands(0, 0.0, partner.now)
-    partner.talk.commands(0, 100.0, partner.now)
+    partner.commands(0.0, 100.0)
     with pytest.raises(ValueRefused):
         partner.talk.commands(0, value, partner.now)
     partner.live(0.1)
@@ -419,7 +401,7 @@ def test_requests_never_hold_up_the_exchange(partner: Partner) -> None:
 
 def test_requests_without_a_drive_end(make: type[Partner]) -> None:
     partner = make()
-    partner.mute = True
+    partner.deaf = True
     partner.start()
     for _ in range(3):
         partner.reads(GAIN, RAMP, DAMPING)
@@ -439,19 +421,19 @@ def test_requests_are_refused_while_nothing_can_be_sent(make: type[Partner]) -> 
 
 
 def test_64_requests_wait(partner: Partner) -> None:
-    partner.mute = True
+    partner.deaf = True
     for _ in range(70):
         partner.reads(GAIN)
     refused = outcomes(partner)
     assert refused == [['busy']] * len(refused)
     assert len(refused) in (5, 6)
-    partner.mute = False
+    partner.deaf = False
     partner.live(10.0)
     assert len(outcomes(partner)) == 70 - len(refused)
 
 
 def test_requests_end_with_the_bus_or_with_activity(partner: Partner) -> None:
-    partner.mute = True
+    partner.deaf = True
     for reason in ('bus down', 'bridge inactive'):
         partner.reads(GAIN, RAMP)
         partner.reads(GAIN)
@@ -511,13 +493,13 @@ def test_frames_of_strangers_do_no_harm(partner: Partner) -> None:
 
 
 def test_unasked_frames_are_counted(partner: Partner) -> None:
-    seen = [text for _, text in partner.frames]
+    seen = [text for _, text in partner.log]
     partner.live(0.1)
     answered = [answer for _, text in partner.take() for answer in partner.answers(text)]
     assert answered
     assert not seen
     before = partner.talk.session.statistics.rejected
     partner.talk.events()
-    partner.talk.hears(answered[-1], partner.now + DELAY)
+    partner.talk.hears(answered[-1], partner.now + partner.DELAY)
     assert partner.talk.session.statistics.rejected == before + 1
     assert len(partner.talk.events(FrameRejected)) == 1

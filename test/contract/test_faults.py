@@ -127,10 +127,10 @@ class TestKnown:
     def test_a_drive_that_is_found_in_fault(self, name: str, mapped: bool) -> None:
         partner = meet(name, mapped=mapped)
         trip(partner, 7)
-        partner.mute = True
+        partner.deaf = True
         partner.live(1.0)
         assert text(partner) == ''
-        partner.mute = False
+        partner.deaf = False
         partner.live(2.0)
         assert text(partner) == '7 overcurrent'
 

@@ -34,7 +34,7 @@ def word(partner: Partner, name: str) -> dict[str, int]:
 def test_nothing_was_sent_at_first(family: str) -> None:
     partner = PARTNERS[family]()
     assert set(told(partner).values()) == {None}
-    partner.mute = True
+    partner.deaf = True
     partner.deliver(partner.talk.bus_up(partner.now))
     assert set(told(partner).values()) == {None}
 
@@ -54,8 +54,7 @@ def test_setpoints_as_the_drive_got_them(family: str) -> None:
     partner.live(0.1)
     assert told(partner) == {**word(partner, 'enable'), 'speed_setpoint': -1500}
     assert list(partner.commanded())[-1] == -1500 & 0xFFFF
-    partner.deliver(partner.talk.deactivate(partner.now))
-    partner.live(1.0)
+    partner.ends(1.0)
     assert told(partner) == {**word(partner, 'disable'), 'speed_setpoint': 0}
 
 
@@ -85,7 +84,7 @@ def test_a_stop_that_is_told_when_the_bus_is_back(family: str) -> None:
     assert told(partner) == {**word(partner, 'enable'), 'speed_setpoint': -1500}
     partner.deliver(partner.talk.bus_down(partner.now))
     assert told(partner) == {**word(partner, 'enable'), 'speed_setpoint': -1500}
-    partner.mute = True
+    partner.deaf = True
     partner.deliver(partner.talk.bus_up(partner.now))
     partner.live(2.0)   # cia402: a node that NMT may have stopped gets its word for a second first
     assert not session.online
@@ -120,8 +119,7 @@ def test_control_word_with_and_without_a_slot(family: str, request_: tuple[Param
 
 def test_activation_begins_anew(family: str) -> None:
     partner = started(family)
-    partner.deliver(partner.talk.deactivate(partner.now))
-    partner.live(1.0)
+    partner.ends(1.0)
     partner.deliver(partner.talk.bus_down(partner.now))
     partner.deliver(partner.talk.activate(partner.now))
     assert set(told(partner).values()) == {None}

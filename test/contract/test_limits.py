@@ -61,17 +61,14 @@ class TestInEveryState:
         assert partner.registers[51] == 300
         assert partner.talk.events(SetpointsExpired) == []
         assert math.isnan(partner.talk.session.setpoints.age(partner.now))
-        partner.deliver(partner.talk.deactivate(partner.now))
-        partner.live(1.0)
-        assert partner.talk.session.stopped
+        partner.ends(1.0)
         assert partner.registers[51] == 300
 
     def test_the_next_activation_begins_with_neutral(self, name: str, control: Any) -> None:
         partner = meet(name, control=control)
         limits(partner, 30.0)
         partner.live(0.1)
-        partner.deliver(partner.talk.deactivate(partner.now))
-        partner.live(1.0)
+        partner.ends(1.0)
         assert limits(partner, 50.0) is not CommandOutcome.ACCEPTED
         partner.deliver(partner.talk.activate(partner.now))
         partner.live(0.3)
@@ -79,14 +76,14 @@ class TestInEveryState:
 
     def test_after_a_loss_the_last_one_is_sent(self, name: str, control: Any) -> None:
         partner = meet(name, control=control)
-        partner.mute = True
+        partner.deaf = True
         partner.live(1.0)
         assert len(partner.talk.events(StationLost)) == 1
         assert limits(partner, 30.0) is CommandOutcome.ACCEPTED
         partner.talk.bus_down(partner.now)
         partner.registers[51] = 7       # whoever had it meanwhile
         assert limits(partner, 40.0) is CommandOutcome.ACCEPTED
-        partner.mute = False
+        partner.deaf = False
         partner.deliver(partner.talk.bus_up(partner.now))
         partner.live(1.0)
         assert partner.talk.session.online
@@ -129,8 +126,7 @@ def test_a_drive_that_runs_keeps_it_to_its_last_frame(name: str) -> None:
     partner.live(2.0)                   # the command has expired
     assert (partner.registers[50], partner.registers[51]) == (0, 300)
     run(partner)
-    partner.deliver(partner.talk.deactivate(partner.now))
-    partner.live(1.0)
+    partner.ends(1.0)
     assert (partner.registers[50], partner.registers[51]) == (0, 300)
 
 
@@ -140,8 +136,7 @@ def test_a_stop_by_number_leaves_it_alone(name: str) -> None:
     limits(partner, 30.0)
     run(partner)
     partner.registers[51] = 7
-    partner.deliver(partner.talk.deactivate(partner.now))
-    partner.live(1.0)
+    partner.ends(1.0)
     assert (partner.registers[50], partner.registers[51]) == (0, 7)
     assert warnings(partner) == []
 
@@ -150,9 +145,9 @@ def test_a_drive_whose_maps_differ_is_stopped_without_it() -> None:
     partner = meet('datamodel_extended')
     limits(partner, 30.0)
     run(partner)
-    partner.mute = True
+    partner.deaf = True
     partner.live(1.0)
-    partner.mute = False
+    partner.deaf = False
     partner.registers[122], partner.registers[51] = 60, 7
     partner.registers[60] = 0
     partner.live(1.0)
@@ -163,6 +158,4 @@ def test_a_drive_whose_maps_differ_is_stopped_without_it() -> None:
 def test_a_drive_with_nothing_but_a_limit_is_online_at_once() -> None:
     partner = PARTNERS['datamodel_standard'](request=(TORQUE,)).start()
     assert partner.talk.session.state is DriveState.ONLINE
-    partner.deliver(partner.talk.deactivate(partner.now))
-    partner.live(1.0)
-    assert partner.talk.session.stopped
+    partner.ends(1.0)

@@ -69,8 +69,7 @@ def enabled(kind: str, **options: Any) -> Partner:
 def running(kind: str, **options: Any) -> Partner:
     """Return one that runs, at 100 rpm."""
     partner = enabled(kind, **{'command_timeout': 0.0, **options})
-    for value in (0.0, 100.0):
-        partner.talk.commands(0, value, partner.now)
+    partner.commands(0.0, 100.0)
     partner.live(max(0.1, 2 * partner.configuration.period))
     assert partner.registers[50] == 1000
     partner.take()
@@ -82,20 +81,13 @@ def asks(partner: Partner, action: ControlAction) -> None:
     partner.deliver(partner.talk.asks(action, partner.now))
 
 
-def ends(partner: Partner) -> None:
-    """Deactivate it, and wait for that."""
-    partner.deliver(partner.talk.deactivate(partner.now))
-    partner.live(partner.talk.session.longest_stop + 0.5)
-    assert partner.talk.session.stopped
-
-
 # -- the stop -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_the_end_of_a_drive_that_runs_and_hears(kind: str) -> None:
     partner = running(kind)
-    ends(partner)
+    partner.ends()
     assert partner.registers[50] == 0
     assert worries(partner) == []
     control = partner.talk.session.control
@@ -108,7 +100,7 @@ def test_the_end_of_a_drive_that_runs_and_hears(kind: str) -> None:
 @pytest.mark.parametrize('kind', KINDS)
 def test_a_bus_that_goes_during_the_stop(kind: str) -> None:
     partner = running(kind)
-    partner.mute = True
+    partner.deaf = True
     partner.deliver(partner.talk.deactivate(partner.now))
     partner.live(0.001)
     partner.talk.events()
@@ -138,7 +130,7 @@ def test_a_stop_that_the_bus_refuses_for_a_while_goes_on(kind: str) -> None:
 @pytest.mark.parametrize('kind', KINDS)
 def test_a_second_end_and_a_stall_meanwhile_change_nothing(kind: str) -> None:
     partner = running(kind)
-    partner.mute = True
+    partner.deaf = True
     partner.deliver(partner.talk.deactivate(partner.now))
     partner.live(0.03)
     partner.deliver(partner.talk.deactivate(partner.now))
@@ -156,7 +148,7 @@ def test_a_second_end_and_a_stall_meanwhile_change_nothing(kind: str) -> None:
 @pytest.mark.parametrize('kind', KINDS)
 def test_a_silent_drive_that_ran_is_told_of_once(kind: str) -> None:
     partner = running(kind)
-    partner.mute = True
+    partner.deaf = True
     partner.live(3.0)
     assert len(partner.talk.events(StationLost)) == 1
     partner.take()
@@ -164,7 +156,7 @@ def test_a_silent_drive_that_ran_is_told_of_once(kind: str) -> None:
     assert set(partner.commanded()) <= {0}
     assert worries(partner) == []
     assert partner.talk.session.duty.owed
-    partner.mute = False
+    partner.deaf = False
     partner.live(2.0)
     assert partner.talk.session.online
     assert partner.registers[50] == 0
@@ -186,7 +178,7 @@ def test_neutral_that_was_heard_is_a_stop(kind: str) -> None:
     assert worries(partner) == []
     partner.deliver(partner.talk.bus_up(partner.now))
     partner.live(1.0)
-    ends(partner)
+    partner.ends()
     assert worries(partner) == []
 
 
@@ -198,8 +190,7 @@ def test_what_the_bus_refused_was_never_told(kind: str) -> None:
     if kind in CONTROLLED:
         asks(partner, ControlAction.ENABLE)
     else:
-        partner.talk.commands(0, 0.0, partner.now)
-        partner.talk.commands(0, 100.0, partner.now)
+        partner.commands(0.0, 100.0)
     partner.live(0.025)
     assert not partner.talk.session.duty.owed
     partner.talk.bus_down(partner.now)
@@ -212,8 +203,7 @@ def test_an_activation_owes_nothing_of_the_one_before(kind: str) -> None:
     partner.talk.bus_down(partner.now)
     partner.deliver(partner.talk.deactivate(partner.now))
     assert len(worries(partner)) == 2
-    partner.deliver(partner.talk.bus_up(partner.now))
-    partner.deliver(partner.talk.activate(partner.now))
+    partner.activate()
     assert not partner.talk.session.duty.owed
     assert partner.talk.control_outcomes() == []
     partner.live(1.0)
@@ -226,7 +216,7 @@ def stopped_for_a_defect(kind: str, *, mute: bool) -> Partner:
     """Return one that ran, and whose stop for a defect has ended."""
     partner = running(kind)
     session = partner.talk.session
-    partner.mute = mute
+    partner.deaf = mute
     session.fail(internal_error('KeyError', 'x'), partner.now)
     partner.deliver(partner.talk.sent())
     partner.live(session.longest_stop + 0.5)
@@ -246,7 +236,7 @@ def test_a_stop_that_failed_for_a_defect_is_owed_on(kind: str) -> None:
     partner.live(2.0)
     assert session.owed
     partner.talk.events()
-    ends(partner)
+    partner.ends()
     assert len(worries(partner)) == 1
 
 
@@ -256,9 +246,9 @@ def test_who_is_owed_a_stop_behind_a_defect_is_told_again_by_the_end(kind: str) 
     partner = stopped_for_a_defect(kind, mute=True)
     session = partner.talk.session
     assert session.owed
-    partner.mute = False
+    partner.deaf = False
     partner.talk.events()
-    ends(partner)
+    partner.ends()
     assert partner.registers[50] == 0
     assert worries(partner) == []
     assert not session.owed
@@ -269,7 +259,7 @@ def test_who_is_owed_a_stop_behind_a_defect_and_deaf_is_named_once_more(kind: st
     partner = stopped_for_a_defect(kind, mute=True)
     partner.talk.events()
     partner.take()
-    ends(partner)
+    partner.ends()
     assert partner.take() != []
     assert len(worries(partner)) == 1
 
@@ -280,7 +270,7 @@ def test_who_is_owed_nothing_behind_a_defect_is_left_alone_by_the_end(kind: str)
     session = partner.talk.session
     assert not session.owed
     partner.take()
-    ends(partner)
+    partner.ends()
     assert partner.take() == []
     assert worries(partner) == []
 
@@ -292,7 +282,7 @@ def test_behind_the_end_a_bridge_is_inactive_whatever_the_defect_was(kind: str) 
     session.fail(internal_error('KeyError', 'x'), partner.now)
     refuses = session.services.control_refusal
     assert refuses(ControlAction.QUICK_STOP).code == 'internal_error'
-    ends(partner)
+    partner.ends()
     assert refuses(ControlAction.QUICK_STOP).code == 'bridge_inactive'
 
 
@@ -342,7 +332,7 @@ def test_a_stop_disarms_and_goes_at_once(kind: str, action: ControlAction) -> No
 @pytest.mark.parametrize('kind', CONTROLLED)
 def test_an_end_that_was_wanted_is_no_warning(kind: str) -> None:
     partner = running(kind)
-    ends(partner)
+    partner.ends()
     noted = [note for note in partner.talk.events(Noted) if note.text == says('enable_withdrawn')]
     assert [note.warning for note in noted] == [False]
 

@@ -12,7 +12,7 @@ from builders import GAIN, RAMP, read
 from extent import some
 from partners import Partner, PARTNERS
 import pytest
-from timeline import Coming
+from coming import Coming
 
 TIMEOUT = 0.2
 #: s that an answer takes: long enough to be under way when the process stops

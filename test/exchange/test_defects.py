@@ -17,7 +17,7 @@ from drives import CannordDrive, ExtendedDrive, Motor, PkwNode, StandardDrive
 from exchange_builders import Bench
 from extent import some
 import pytest
-from timeline import Coming
+from coming import Coming
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlRequest

@@ -124,7 +124,7 @@ def test_word_that_cannot_be_read_back_is_never_repeated() -> None:
     assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
     *sent, (withdrawn_at, last) = talk.served(12.0751, lambda text: echo(text, '4100'), 0.001)
     assert not {ENABLE_0, ENABLE_1} & {text for _, text in sent}
-    assert (withdrawn_at, last) == (12.075, DISABLE_1), 'it is not known to be disabled any more'
+    assert (withdrawn_at, last) == (12.075, DISABLE_0), 'it is not known to be disabled any more'
     assert talk.control_outcomes() == [('enable', False, says('stuck', timeout=2.0))]
 
 

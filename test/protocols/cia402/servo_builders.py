@@ -8,6 +8,7 @@ from typing import Any
 from builders import drive, frame, INT16, INT32, parameter, RAM, RO
 from conversation import Conversation
 from drives import ServoDrive
+from timeline import Pair
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
@@ -58,14 +59,11 @@ def servo(mode: str = 'csv', **options: Any) -> DriveConfiguration:
     return drive('cia402', mode=mode, **options)
 
 
-class Axis:
+class Axis(Pair):
     """
     A session and the drive at the other end of the bus, with a heartbeat each 0.1 s.
 
     :param make: makes the drive.
-    :ivar log: what was sent, and when.
-    :ivar mute: nothing of what the drive says arrives.
-    :ivar deaf: nothing of what it is told arrives.
     """
 
     DELAY = 0.0002
@@ -73,56 +71,38 @@ class Axis:
     def __init__(self, mode: str = 'csv', objects: dict[tuple[int, int], bytes] | None = None, *,
                  make: Callable[[int, dict[tuple[int, int], bytes]], ServoDrive] = ServoDrive,
                  **options: Any) -> None:
-        self.talk = Conversation(servo(mode, **options))
-        self.session = self.talk.session
+        super().__init__(Conversation(servo(mode, **options)))
         self.drive = make(5, {**OBJECTS, **(objects or {})})
-        self.now = 10.0
         self.beat_at = 10.05
         self.tick_at = 10.0 if self.drive.ticks else math.inf
-        self.log: list[tuple[float, str]] = []
-        self.mute = self.deaf = False
 
-    def deliver(self, sent: list[str]) -> None:
-        for text in sent:
-            self.log.append((round(self.now, 6), text))
-            self.drive.now = self.now
-            answers = [] if self.deaf else self.drive.takes(frame(text))
-            for answer in answers if not self.mute else ():
-                self.now += self.DELAY
-                self.deliver(self.talk.hears(str(answer), self.now))
+    def answers(self, sent: str) -> list[str]:
+        self.drive.now = self.now
+        return [str(answer) for answer in self.drive.takes(frame(sent))]
 
     def says(self, text: str) -> None:
         """Have the drive say something by itself."""
         self.deliver(self.talk.hears(text, self.now))
 
-    def live(self, duration: float) -> None:
-        """Let time pass, every timer in time."""
-        end = self.now + duration
-        for _ in range(100_000):
-            due = self.session.next_timer()
-            if min(due, self.beat_at, self.tick_at) > end:
-                self.now = max(self.now, end)
-                return
-            if self.tick_at <= min(due, self.beat_at):
-                self.now = max(self.now, self.tick_at)
-                self.tick_at += 0.001
-                for said in self.drive.passes(self.now):
-                    self.says(str(said))
-                continue
-            if self.beat_at <= due:
-                self.now = max(self.now, self.beat_at)
-                self.beat_at += 0.1
-                if self.drive.number(0x1017) and not self.mute:
-                    self.says(str(self.drive.beats()))
-                continue
-            self.now = max(self.now, due)
-            self.deliver(self.talk.at(self.now))
-        raise AssertionError('the timer spins')
+    def due(self) -> float:
+        return min(self.tick_at, self.beat_at, super().due())
+
+    def timers(self) -> None:
+        due = self.due()
+        if self.tick_at == due:
+            self.tick_at += 0.001
+            for said in self.drive.passes(self.now):
+                self.says(str(said))
+        elif self.beat_at == due:
+            self.beat_at += 0.1
+            if self.drive.number(0x1017) and not self.mute:
+                self.says(str(self.drive.beats()))
+        else:
+            super().timers()
 
     def start(self) -> 'Axis':
         """Activate, and let it come online."""
-        self.deliver(self.talk.bus_up(self.now))
-        self.deliver(self.talk.activate(self.now))
+        self.activate()
         self.live(0.3)
         return self
 
@@ -147,11 +127,6 @@ class Axis:
         self.deliver(self.talk.asks(action, self.now))
         self.live(wait)
         return self.talk.control_outcomes()
-
-    def commands(self, *values: float) -> None:
-        """Give the only setpoint these values, one after the other."""
-        for value in values:
-            self.talk.commands(0, value, self.now)
 
     def take(self) -> list[str]:
         """Return the frames sent since the last call."""

@@ -377,9 +377,7 @@ class TestOneThatHoldsAndDoesNotTellWhetherItStands:
 
     def test_the_end_of_the_bridge_waits_for_no_time(self) -> None:
         axis = self.braking(5.0)
-        axis.deliver(axis.talk.deactivate(axis.now))
-        axis.live(5.0)
-        assert axis.session.stopped
+        axis.ends(5.0)
         assert axis.words() == ['0200']
         assert any(note.danger for note in axis.talk.events(Noted))
 
@@ -452,9 +450,7 @@ class TestAStatusThatIsLate:
     def test_the_end_right_behind_the_enable_word(self, late: int) -> None:
         axis, drive = self.meet(late)
         self.first_enable_word(axis)
-        axis.deliver(axis.talk.deactivate(axis.now))
-        axis.live(2.0)
-        assert axis.session.stopped
+        axis.ends(2.0)
         assert drive.told[-3:] == [0x0F, 0x07, 0x06]
 
 

@@ -106,8 +106,7 @@ class TestLimits:
 
     def test_the_first_look_comes_behind_a_sync_and_before_000f(self) -> None:
         axis = limited(AcceptsAnything)
-        axis.deliver(axis.talk.bus_up(axis.now))
-        axis.deliver(axis.talk.activate(axis.now))
+        axis.activate()
         while not axis.session.online:
             axis.live(0.001)
         axis.asks(ControlAction.ENABLE)
@@ -122,8 +121,7 @@ class TestLimits:
         takes = axis.drive.takes
         axis.drive.takes = lambda sent: (   # type: ignore[method-assign]
             [] if hold and str(sent) == READ else takes(sent))
-        axis.deliver(axis.talk.bus_up(axis.now))
-        axis.deliver(axis.talk.activate(axis.now))
+        axis.activate()
         while '000#0105' not in [text for _, text in axis.log]:
             axis.live(0.001)
         hold.append(True)

@@ -213,8 +213,7 @@ class TestRestarts:
         takes = axis.drive.takes
         axis.drive.takes = (        # type: ignore[method-assign]
             lambda sent: [] if str(sent).startswith('605#40001402') else takes(sent))
-        axis.deliver(axis.talk.bus_up(axis.now))
-        axis.deliver(axis.talk.activate(axis.now))
+        axis.activate()
         assert axis.take()[-1] == '605#4000140200000000'
         return axis
 

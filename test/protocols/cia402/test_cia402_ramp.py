@@ -44,9 +44,7 @@ def lost_at_speed(after: float) -> tuple[Axis, RampedServo]:
 @pytest.mark.parametrize('after', [0.0, 0.001, 0.005, 0.3])
 def test_one_that_does_not_come_down_is_named_at_the_end_and_stays_watched(after: float) -> None:
     axis, drive = lost_at_speed(after)
-    axis.deliver(axis.talk.deactivate(axis.now))
-    axis.live(5.0)
-    assert axis.session.stopped
+    axis.ends(5.0)
     assert drive.state == drive.ENABLED
     assert [note for note in axis.talk.events(Noted) if note.danger]
     assert WATCH_ENDS not in axis.take()

@@ -62,9 +62,7 @@ class TestDrivesThatStayInQuickStopWhatever605AhSays:
         axis, drive = meet(kind, control_timeout=4.0)
         drive.brakes = 30
         axis.asks(QUICK_STOP, 0.1)
-        axis.deliver(axis.talk.deactivate(axis.now))
-        axis.live(5.0)
-        assert axis.session.stopped
+        axis.ends(5.0)
         assert axis.words() == ['0200', '0000', '0600']
         assert drive.cut_short == 0
         assert not [note for note in axis.talk.events(Noted) if note.danger]

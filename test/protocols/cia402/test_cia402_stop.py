@@ -39,9 +39,7 @@ def drive_without(axis: Axis, identifier: int) -> Callable[[Frame], list[Frame]]
 def end(axis: Axis) -> list[str]:
     """End the activation; return the frames from then on."""
     axis.take()
-    axis.deliver(axis.talk.deactivate(axis.now))
-    axis.live(5.0)
-    assert axis.session.stopped
+    axis.ends(5.0)
     return axis.take()
 
 
@@ -106,8 +104,7 @@ class TestTheEnd:
             answers = takes(sent)
             return [] if drive.number(0x1016, 1) else answers
         drive.takes = unanswered    # type: ignore[method-assign]
-        axis.deliver(axis.talk.bus_up(axis.now))
-        axis.deliver(axis.talk.activate(axis.now))
+        axis.activate()
         assert axis.take()[-1] == '605#2316100158027F00'
         drive.takes = takes         # type: ignore[method-assign]
         assert WATCH_OFF in end(axis)

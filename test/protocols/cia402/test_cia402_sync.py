@@ -510,9 +510,7 @@ class TestEvent:
         axis.commands(0.0, 100.0)
         axis.live(0.1)
         assert axis.drive.number(0x60FF) == 1000
-        axis.deliver(axis.talk.deactivate(axis.now))
-        axis.live(3.0)
-        assert axis.session.stopped
+        axis.ends(3.0)
         assert axis.drive.state == axis.drive.READY
         assert axis.drive.number(0x60FF) == 0
 

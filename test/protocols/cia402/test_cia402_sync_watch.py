@@ -100,9 +100,7 @@ class TestBetweenRounds:
         axis.live(2.0)
         assert axis.session.online
         assert gaps(axis) == {0.02}
-        axis.deliver(axis.talk.deactivate(axis.now))
-        axis.live(1.0)
-        assert axis.session.stopped
+        axis.ends(1.0)
         last = max(at for at, text in axis.log if text.startswith('205#'))
         assert times(axis, '080#')[-1] == last
 
@@ -155,8 +153,7 @@ class TestBeforeTheFirst:
     @staticmethod
     def first(axis: Axis, seconds: float = 3.0) -> float:
         began = axis.now
-        axis.deliver(axis.talk.bus_up(axis.now))
-        axis.deliver(axis.talk.activate(axis.now))
+        axis.activate()
         axis.live(seconds)
         syncs = times(axis, '080#')
         return syncs[0] - began if syncs else -1.0
