@@ -151,6 +151,7 @@ class CompileModules(build_ext):
 def compiled_modules(folder: str) -> list[Extension]:
     """Return what is to be built; its sources are in ``folder``."""
     from mypyc.build import mypycify
+    asked = re.search(r'-O(\d)', os.environ.get('CFLAGS', ''))
     return list(mypycify(
         [
             # no settings, and no package that is here by chance: the same code everywhere
@@ -158,7 +159,8 @@ def compiled_modules(folder: str) -> list[Extension]:
             f'--cache-dir={folder}/cache',
             *(f'{PACKAGE}/{module}.py' for module in COMPILED),
         ],
-        target_dir=folder, group_name=PACKAGE, opt_level='2', debug_level='0'))
+        target_dir=folder, group_name=PACKAGE, debug_level='0',
+        opt_level=asked[1] if asked else '2'))
 
 
 def remove_libraries(folder: Path) -> None:

@@ -29,7 +29,7 @@ SWEEP = (1, 2, 4, 8, 15, 22, 30)
 #: share of the time that the hypervisor may take from a scenario, and how often it is measured
 STOLEN_MAX, ATTEMPTS = 0.05, 3
 #: takes long, and is run when it is named only
-NAMED_ONLY = ('builds', 'sweep')
+NAMED_ONLY = ('builds', 'builds flood', 'builds stop', 'most', 'sweep')
 
 
 @dataclass(frozen=True)
@@ -44,18 +44,21 @@ class Pace:
     turns: int = 4
     backups: int = 5
     loops: int = 8
+    most: tuple[int, ...] = (30,)
     sweep: tuple[int, ...] = SWEEP
 
 
 #: each scenario for a second or two, to see that it runs
 SMOKE = Pace(calls=5, stops=4, commands=1, rounds=2, windows=2, turns=1, backups=1,
-             loops=1, sweep=(1, 2))
+             loops=1, most=(2, 3), sweep=(1, 2))
 
 
 def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
     """Return the scenarios by name."""
     drives, period, duration = options.drives, options.period, options.duration
     pace = SMOKE if options.smoke else Pace()
+    few, stopped = Load(8, 0.01, subscribed=False), Load(
+        8, 0.01, subscribed=False, control=True, stuck=True)
     return {
         'full': lambda: scenarios.exchange(Load(drives, period, commands=200.0), duration),
         'subscribed': lambda: scenarios.exchange(Load(drives, period), duration),
@@ -66,16 +69,16 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
         'axes': lambda: scenarios.axes(Load(drives, period, subscribed=False), duration),
         'buses': lambda: scenarios.buses(
             Load(2 * drives, period, commands=800.0, buses=2), duration),
+        'most': lambda: scenarios.most(Load(0, 0.01), duration, *pace.most),
         'latency': lambda: scenarios.latency(Load(drives, period), duration),
         'diy': lambda: scenarios.do_it_yourself(Load(8, 0.01, commands=100.0), duration),
         'service': lambda: scenarios.service(Load(1, 0.02, subscribed=False), pace.calls),
-        'flood': lambda: scenarios.flood(Load(8, 0.01, subscribed=False), duration, 10000.0),
+        'flood': lambda: scenarios.flood(few, duration, 10000.0),
         'monitor': lambda: scenarios.monitor(
             Load(drives, period, subscribed=False), duration, pace.turns),
         'panel': lambda: scenarios.panel(
             Load(drives, period, subscribed=False, commands=20.0), duration),
-        'stop': lambda: scenarios.stop(
-            Load(8, 0.01, subscribed=False, control=True, stuck=True), pace.stops, 10000.0, 64),
+        'stop': lambda: scenarios.stop(stopped, pace.stops, 10000.0, 64),
         'gateway': lambda: scenarios.gateway(
             Load(1, 0.02, subscribed=False, servo=True), duration, pace.rounds),
         # a stop without a name would reach every bridge of this machine
@@ -92,8 +95,7 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
         'drives': lambda: {number: scenarios.exchange(
             Load(number, period, subscribed=False), duration, floor=False)
             for number in sorted({1, 4, 8, drives})},
-        'alone': lambda: scenarios.exchange(
-            Load(1, 0.01, subscribed=False), duration, floor=False),
+        'alone': lambda: scenarios.exchange(Load(1, 0.01, subscribed=False), duration),
         'flight': lambda: scenarios.flight(
             Load(drives, period, subscribed=False, trace=2 * duration), duration, pace.rounds),
         'joints': lambda: scenarios.joints(
@@ -101,6 +103,12 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
         'joint take': lambda: scenarios.joint_take(drives, 1000.0, pace.rounds, options.beside),
         'builds': lambda: scenarios.builds(
             drives, pace.windows, 0.2 * duration, options.beside),
+        'builds flood': lambda: scenarios.in_turn(
+            lambda python: scenarios.flood(few, duration, 10000.0, python),
+            pace.turns, options.beside),
+        'builds stop': lambda: scenarios.in_turn(
+            lambda python: scenarios.stop(stopped, pace.stops // 2, 10000.0, 64, python),
+            pace.turns, options.beside),
         'decode': lambda: scenarios.decode(options.frames),
         'start': lambda: scenarios.start(drives, options.memory_duration),
         'sweep': lambda: scenarios.sweep(pace.sweep, 0.01, duration),
@@ -174,8 +182,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--frames', type=int, default=1_000_000, help='of a trace to decode')
     parser.add_argument('--repeat', type=int, default=1, help='runs; the median one is shown')
     parser.add_argument('--beside', metavar='PYTHON', default='', help=(
-        'of another build (its .venv/bin/python): `hand` measures its commands as well, `builds` '
-        'its bridge, `joint take` how it takes commands'))
+        'of another build (its .venv/bin/python): `hand` measures its commands as well, what '
+        'begins with `builds` its bridge, `joint take` how it takes commands'))
+    parser.add_argument('--bridge', metavar='PYTHON', default=sys.executable, help=(
+        'of the build whose bridge is measured (default: this one); bare loops are of this one'))
     parser.add_argument('--json', type=Path, help='write figures and samples to this file')
     parser.add_argument('--plot', type=Path, help='write the distributions to this PNG file')
     parser.add_argument('--sweep-plot', type=Path,
@@ -183,6 +193,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--smoke', action='store_true',
                         help='every scenario, for a second each: does it run?')
     options = parser.parse_args(arguments)
+    scenarios.BUILD = options.bridge
     if options.smoke:
         options.drives, options.period, options.duration = 2, 0.02, 1.0
         options.memory_duration, options.frames = 1.0, 20_000

@@ -5,7 +5,7 @@ What is measured. Each scenario runs the bridge and its floor one after the othe
 All return plain numbers: times in s, CPU time in s, memory in MB; lists are samples.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, ExitStack, nullcontext
 from dataclasses import dataclass, replace
 import math
@@ -28,6 +28,10 @@ from viewer import Viewer
 SETTLE = 2.0
 #: the program that a user types
 DRIVE_CAN = (sys.executable, '-m', 'drive_can_bridge.cli.start')
+#: the Python of the bridge that is measured, where nothing else is said
+BUILD = sys.executable
+#: drives that a bus of 1 Mbit/s has room for every 10 ms
+FULL = 30
 #: a user whom no bridge trusts
 NOBODY = 65534
 #: a process that computes, until who started it has ended
@@ -66,6 +70,7 @@ class Load:
     :param servo: the drives are axes of CiA 402 in csp.
     :param tuned: behind a gateway, with or without ``tcp_tune``; None: on a bus of their own.
     :param joints: Hz of the message with all joints; 0: there is none; None: drives have no joint.
+    :param cores: on which its processes run; None: on all.
     """
 
     drives: int
@@ -81,6 +86,7 @@ class Load:
     servo: bool = False
     tuned: bool | None = None
     joints: float | None = None
+    cores: frozenset[int] | None = None
 
     @property
     def how(self) -> tuple[str, ...]:
@@ -172,12 +178,13 @@ class Bridges:
     """
 
     def __init__(self, stack: ExitStack, load: Load, bus: Bus, *each: tuple[object, ...],
-                 python: str = sys.executable) -> None:
+                 python: str = '') -> None:
         self._bus, self._load = bus, load
         self._diagnostics = stack.enter_context(child('subscriber.py', 'diagnostics'))
-        self.processes = [stack.enter_context(child(
-            'bridge.py', *load.how, *arguments, python=python))
-                          for arguments in each or [(bus.file,)]]
+        with kept_to(load.cores):
+            self.processes = [stack.enter_context(child(
+                'bridge.py', *load.how, *arguments, python=python or BUILD))
+                              for arguments in each or [(bus.file,)]]
         begun = min(process.ready for process in self.processes)
         until = begun + PATIENCE
         while True:
@@ -225,8 +232,19 @@ class Bridges:
 
 
 @contextmanager
+def kept_to(cores: Iterable[int] | None) -> Iterator[None]:
+    """Keep what is started meanwhile to these cores; None: as it is."""
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, before if cores is None else cores)
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+@contextmanager
 def bridge_under(load: Load, bus: Bus, *each: tuple[object, ...],
-                 python: str = sys.executable) -> Iterator[Bridges]:
+                 python: str = '') -> Iterator[Bridges]:
     """Run the bridge, and whoever commands it."""
     with ExitStack() as stack:
         bridges = Bridges(stack, load, bus, *each, python=python)
@@ -260,6 +278,7 @@ def exchange(load: Load, duration: float, *, floor: bool = True) -> dict[str, An
             bridge.clear()
             time.sleep(duration)
             found['bridge'] = bridge.result()
+            found['wanted'] = load.drives / load.period
             found['sleeper'] = sleeper.ask('errors')
             found['resident_mb'] = bridge.resident_mb()
         if floor:
@@ -299,19 +318,22 @@ def buses(load: Load, duration: float) -> dict[str, Any]:
     """Measure full buses: all of them by one process, and by one process each."""
     found: dict[str, Any] = {}
     for name in ('one process', 'one process a bus'):
-        with ExitStack() as stack:
-            bus = Bus(stack, load)
-            subscribers(stack, load)
-            each = [(bus.file,)] if name == 'one process' else bus.files_each()
-            bridges = stack.enter_context(bridge_under(load, bus, *each))
-            bridges.clear()
-            time.sleep(duration)
-            result = bridges.result()
-        found[name] = {
-            'exchanges_per_s': result['exchanges'] / result['elapsed'],
+        found[name] = _full(load, duration, apart=name != 'one process')
+    return found
+
+
+def _full(load: Load, duration: float, *, apart: bool) -> dict[str, Any]:
+    """Measure what is subscribed to, by one process or by one for each bus."""
+    with ExitStack() as stack:
+        bus = Bus(stack, load)
+        subscribers(stack, load)
+        bridges = stack.enter_context(bridge_under(load, bus, *bus.files_each() if apart else ()))
+        bridges.clear()
+        time.sleep(duration)
+        result = bridges.result()
+    return {'exchanges_per_s': result['exchanges'] / result['elapsed'],
             'missed': result['missed'], 'cpu': result['process_cpu'] / result['elapsed'],
             'period_errors': result['period_errors'], 'wanted': load.drives / load.period}
-    return found
 
 
 def latency(load: Load, duration: float) -> dict[str, list[float]]:
@@ -340,12 +362,13 @@ def service(load: Load, calls: int) -> dict[str, Any]:
     return found
 
 
-def flood(load: Load, duration: float, commands: float) -> dict[str, Any]:
+def flood(load: Load, duration: float, commands: float,
+          python: str = '') -> dict[str, Any]:
     """Measure the period of one bridge in quiet and in a flood of services and commands."""
     found: dict[str, Any] = {}
     with ExitStack() as stack:
         bus = Bus(stack, load)
-        with (bridge_under(load, bus) as bridge,
+        with (bridge_under(load, bus, python=python) as bridge,
               child('sleeper.py', load.period) as sleeper,
               child('caller.py', load.drives) as caller):
             for name in ('quiet', 'flood'):
@@ -442,12 +465,13 @@ def backup(load: Load, rounds: int = 5) -> dict[str, Any]:
     return found
 
 
-def stop(load: Load, calls: int, commands: float, under_way: int) -> dict[str, Any]:
+def stop(load: Load, calls: int, commands: float, under_way: int,
+         python: str = '') -> dict[str, Any]:
     """Measure from the call of a stop to its frame at the drive, in quiet and under load."""
     found: dict[str, Any] = {}
     with ExitStack() as stack:
         bus = Bus(stack, load)
-        with (bridge_under(load, bus), child('stopper.py') as stopper,
+        with (bridge_under(load, bus, python=python) as bridge, child('stopper.py') as stopper,
               child('caller.py', load.drives) as caller,
               child('sleeper.py', load.period) as sleeper):
             for name in ('quiet', 'load'):
@@ -457,10 +481,12 @@ def stop(load: Load, calls: int, commands: float, under_way: int) -> dict[str, A
                     caller.ask(f'pester {under_way}')
                     time.sleep(SETTLE)
                 sleeper.ask('clear')
-                bus.drives[0].ask('clear')
+                bridge.clear()
                 answer = stopper.ask(f'stop {calls}')
                 stops = bus.drives[0].ask('stops')
+                result = bridge.result()
                 found[name] = {
+                    'missed': result['missed'], 'exchanges': result['exchanges'],
                     'latencies': [min((at - called for at in stops if at > called),
                                       default=float('inf')) for called in answer['called']],
                     'failures': answer['failures'], 'sleeper': sleeper.ask('errors')}
@@ -671,6 +697,39 @@ def do_it_yourself(load: Load, duration: float) -> dict[str, Any]:
     return found
 
 
+def most(load: Load, duration: float, first: int,
+         fewer_than: float = math.inf) -> dict[str, Any]:
+    """
+    Find how many drives one core holds: one process for each full bus, none of it missed.
+
+    All others have the other cores, if there are any. A number that is not held is tried twice.
+
+    :param first: the number that is tried first.
+    :return: the largest number that was held, and what was found of each that was tried.
+    """
+    *others, core = sorted(os.sched_getaffinity(0))
+    found: dict[str, Any] = {'most': 0, 'tried': {}}
+    with kept_to(others or [core]):
+        too_many, number = fewer_than, first
+        while too_many - found['most'] > 2:
+            tried = found['tried'].setdefault(number, [])
+            each = replace(load, drives=number, buses=math.ceil(number / FULL),
+                           cores=frozenset([core]))
+            try:
+                tried.append(_full(each, duration, apart=True))
+            except SystemExit as error:     # drives are offline, or nobody can say
+                tried.append({'missed': math.inf, 'why': str(error)})
+            if not tried[-1]['missed']:
+                found['most'] = number
+            elif len(tried) == 1:
+                continue
+            else:
+                too_many = number
+            number = int(1.5 * number if too_many == math.inf else 0.5 * (
+                found['most'] + too_many))
+    return found
+
+
 def sweep(numbers: Sequence[int], period: float, duration: float) -> dict[int, dict[str, Any]]:
     """Measure the same for so many drives, all of them on one bus."""
     return {number: do_it_yourself(Load(number, period, commands=100.0), duration)
@@ -770,7 +829,7 @@ def builds(drives: int, windows: int, duration: float, other: str) -> dict[str, 
     :param other: its Python; '' is this build once more, which shows how far to believe a ratio.
     :return: by load, pairs of CPU shares of this build and of the other.
     """
-    pythons = [sys.executable, other or sys.executable]
+    pythons = [BUILD, other or BUILD]
     quiet = Load(drives, 0.01, subscribed=False)
     found: dict[str, Any] = {}
     for name, load in (('nobody subscribed', quiet),
@@ -799,6 +858,22 @@ def builds(drives: int, windows: int, duration: float, other: str) -> dict[str, 
                     shares = [(bridge.cpu() - cpu) / elapsed
                               for bridge, cpu in zip(bridges, spent)]
                     pairs.append(shares[::turned])
+    return found
+
+
+def in_turn(scenario: Callable[[str], Any], rounds: int, other: str) -> list[list[Any]]:
+    """
+    Measure a scenario of this build and of another in turn, the order reversed every other time.
+
+    :param scenario: is called with the Python of a build.
+    :param other: '' is this build once more, which shows how far to believe a difference.
+    :return: what was found of this build, and of the other.
+    """
+    pythons = [BUILD, other or BUILD]
+    found: list[list[Any]] = [[], []]
+    for number in range(2 * rounds):
+        place = number % 2 ^ number // 2 % 2
+        found[place].append(scenario(pythons[place]))
     return found
 
 

@@ -37,31 +37,34 @@ class Stopper:
         called: list[float] = []
         failures: list[str] = []
         for number in range(int(count)):
-            answer = self._call(self._enable, SetBool.Request(data=True))
-            if answer is None or not answer.success:
-                failures.append('no answer' if answer is None else answer.message)
+            failure = self._failure('enable', self._enable, SetBool.Request(data=True))
+            if failure:
+                failures.append(failure)
                 continue
             time.sleep(random.uniform(0.02, 0.06))
             called.append(time.monotonic())
-            answer = (self._call(self._enable, SetBool.Request(data=False)) if number % 2
-                      else self._call(self._quick_stop, Trigger.Request()))
-            if answer is None or not answer.success:
-                failures.append('no answer' if answer is None else answer.message)
+            failure = (self._failure('disable', self._enable, SetBool.Request(data=False))
+                       if number % 2 else
+                       self._failure('quick stop', self._quick_stop, Trigger.Request()))
+            if failure:
+                failures.append(failure)
         return {'called': called, 'failures': failures}
 
     def enable(self) -> bool:
         """Enable the first drive; return whether it is."""
         if not self._enable.wait_for_service(PATIENCE):
             raise SystemExit('no service')
-        answer = self._call(self._enable, SetBool.Request(data=True))
-        return answer is not None and answer.success
+        return not self._failure('enable', self._enable, SetBool.Request(data=True))
 
     @staticmethod
-    def _call(client: Any, request: Any) -> Any:
+    def _failure(what: str, client: Any, request: Any) -> str:
+        """Call; return what was not answered well, '' if it was."""
         future = client.call_async(request)
         done = threading.Event()
         future.add_done_callback(lambda _: done.set())
-        return future.result() if done.wait(PATIENCE) else None
+        if not done.wait(PATIENCE):
+            return f'{what}: no answer'
+        return '' if future.result().success else f'{what}: {future.result().message}'
 
 
 def main() -> None:

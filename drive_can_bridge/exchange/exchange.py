@@ -56,6 +56,8 @@ PATIENCE, LITTLE_PATIENCE = LOST_TIME, 0.05
 LOOK_PERIOD = 0.05
 #: s by which the reader may be back too late before the timer thread does its work
 GRACE = 0.02
+#: s by which the reader is so late for a pass that it looks first at what has come meanwhile
+LATE = 0.0005
 #: frames that may have come in one packet and are read before something is sent
 LOOK_AHEAD = 8
 #: s until the values sent last are published again
@@ -430,7 +432,10 @@ class BusExchange:
 
     def _keep_time(self, longest: float) -> float:
         """Serve what is due, in the reader thread; return how many s it may wait for a frame."""
-        if self._clock() >= self._wake_at:
+        late = self._clock() - self._wake_at
+        if late >= 0.0:
+            if late > LATE:
+                self._catch_up()
             self._serve()
         with self.lock:
             now = self._clock()
@@ -439,6 +444,18 @@ class BusExchange:
         if oversleeping:    # it fell asleep when less was to be done
             self._wake.ring()
         return max(0.0, self._back_at - now)
+
+    def _catch_up(self) -> None:
+        """
+        Handle what waits, a frame of each drive at most: no answer that has come is missed.
+
+        Where others have the interpreter, each frame may take as long as a turn of the drives.
+        """
+        for _ in self._members:
+            waiting = self.link.look()
+            if waiting is None:
+                break
+            self.frame_received(*waiting)
 
     def _serve(self) -> None:
         """Make a pass, and run the periodic task."""

@@ -6,7 +6,7 @@ import threading
 import time
 
 from builders import (
-    CONTROL, drive, GAIN, INT16, parameter, RAMP, read, RO, SPEED, WORD, write)
+    CONTROL, drive, frame, GAIN, INT16, parameter, RAMP, read, RO, SPEED, WORD, write)
 from clocks import HandClock, REAL
 from exchange_builders import all_routes, Bench, BusNotes
 from jumping import JumpingClock
@@ -408,6 +408,31 @@ def test_what_a_frame_makes_due_wakes_nobody_but_the_reader() -> None:
         bench.hears(ANSWER, 10.001)
         assert exchange._wake.wait(0.0) is rings
         assert (exchange._wake_at < 20.0) is not rings
+
+
+def test_no_answer_that_only_waits_for_a_late_reader_is_missed() -> None:
+    bench = Bench(*(drive(name=f'drive{station}', station=station, period=0.01, mapping='assume')
+                    for station in range(1, 9)))
+    bench.begin()
+    for _ in range(100):
+        bench.now += 0.007      # the interpreter is others', and each turn late
+        bench.exchange._keep_time(0.02)
+        bench.link.coming += [frame(f'{int(sent[:8], 16) | 1 << 28:08X}#03E800FA00010000')
+                              for sent in bench.link.take()]
+        if bench.link.coming:       # one by one, as a link reads
+            bench.exchange.frame_received(bench.link.coming.pop(0), 0.0)
+    assert [session.statistics.missed for session in bench.sessions] == [0] * 8
+    assert all(session.online for session in bench.sessions)
+
+
+def test_a_bus_that_is_flooded_keeps_no_late_cycle_waiting() -> None:
+    bench = Bench()
+    bench.online()
+    bench.link.coming = [frame('7F1#00')] * 1000
+    bench.now += 0.1
+    bench.exchange._keep_time(0.02)
+    assert bench.link.take()
+    assert len(bench.link.coming) == 1000 - len(bench.sessions)
 
 
 @pytest.mark.interpreted    # replaces a property
