@@ -32,7 +32,6 @@ from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.ros.coroutines import Awaited
 from drive_can_bridge.ros.drive_services import CoroutineServices
-from drive_can_bridge.ros.log import BURST
 from drive_can_bridge.ros.messages import value_of
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.threads import ServiceThread
@@ -294,15 +293,14 @@ class ParameterServices:
             self._failed(f'{what} parameters', sentences.more_names_failed(more), more)
 
     def _tell_outcomes(self, what: str, failures: Sequence[tuple[Parameter, Failure]]) -> None:
-        """Log the failures of a call; where the names are not at fault, only the first."""
-        alike = 0
+        """Log the failures of a call; of names that are not at fault and fail alike, the first."""
+        alike: dict[tuple[str, Parameter | None], list[Parameter]] = {}
         for parameter, failure in failures:
-            alike += failure.kind.of_bridge
-            if alike <= BURST or not failure.kind.of_bridge:
-                self._failed(f'{what} {_title(parameter)}', failure.reason, 0)
-        if alike > BURST:
-            self._failed(f'{what} parameters',
-                         sentences.more_names_failed(count=alike - BURST), 0)
+            of_name = None if failure.kind.of_bridge else parameter
+            alike.setdefault((failure.reason, of_name), []).append(parameter)
+        for (reason, _), (first, *more) in alike.items():
+            others = f' and {len(more)} more' if more else ''
+            self._failed(f'{what} {_title(first)}{others}', reason, 0)
 
     def _announce(self, written: list[tuple[str, Parameter, int]]) -> None:
         if not written:

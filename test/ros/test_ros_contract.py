@@ -514,10 +514,11 @@ def test_a_drive_that_is_not_there(start: Start, client: Client, facts: Facts) -
     client.listen()
     # the first is tried, the others fail at once
     assert client.get(DRIVE, 'gain', 'flag', 'ramp_time') == [None, None, None]
+    client.wait_logged(f"conveyor: read gain ({facts.address_of('gain')}) and 2 more: "
+                       f'{sentences.no_answer_offline()}', WARN)
+    assert len([line for line in client.logged() if 'conveyor: read ' in line]) == 1
     assert client.set(DRIVE, gain=1, flag=True) == [
         (False, sentences.no_answer_offline())] * 2
-    client.wait_logged(
-        f"conveyor: read gain ({facts.address_of('gain')}): no answer; drive offline", WARN)
     assert not client.set_atomically(DRIVE, **facts.atomic)[0]
     assert client.transition(4)
     assert client.get(DRIVE, 'gain') == [None]
