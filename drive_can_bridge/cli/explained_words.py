@@ -60,6 +60,7 @@ VERDICTS = {
         _coded('not_stopped', '{drive}: NOT STOPPED: {why}', 'NOT STOPPED: {why}',
                do='make sure that the drive stands still, by other means if need be; then see '
                   'what the reason says'),
+        _coded('no_fault_now', '{drive}: reports no fault: {why}', do='enable the drive to go on'),
         _coded('drive_went_offline', '{drive}: offline: {why}', 'offline: {why}',
                do='see what the reason says; then power, cable, station and bit rate of the '
                   'drive: the bridge goes on looking for it'))}

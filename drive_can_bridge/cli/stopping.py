@@ -18,6 +18,8 @@ from drive_can_bridge.process.presence import Present, short
 
 #: s without a message after which the rest is imported, and how many are read before
 _QUIET, _WORDS = 0.03, 1000
+#: (command, whether it succeeded) -> what stands before the answer, where that does not say it
+_VERDICTS = {('stop', False): 'NOT STOPPED', ('reset', True): 'reports no fault'}
 
 
 class WithoutRos:
@@ -125,7 +127,7 @@ def show(told: Sequence[Answer], order: str, *, json: bool) -> int:
                         'message': answer.text, 'code': code_of(answer.text),
                         **({'domain': answer.domain} if elsewhere else {})})
         else:
-            verdict = '' if answer.ok or order != 'stop' else 'NOT STOPPED'
+            verdict = _VERDICTS.get((order, answer.ok), '')
             say((f'[domain {answer.domain}] ' if elsewhere else '')
                 + ': '.join(filter(None, (name, verdict, answer.text))))
     return 0 if told and all(answer.ok for answer in told) else FAILED
