@@ -39,6 +39,7 @@ from drive_can_bridge.protocols.scanner import Certainty, Scanner, Sighting
 from drive_can_bridge.transport import adapters
 from drive_can_bridge.transport.adapters import adapter_keywords, check_channel, check_interface
 from drive_can_bridge.transport.end_point import EndPoint
+from drive_can_bridge.transport.kernel_interfaces import kernel_interfaces
 from drive_can_bridge.transport.port import open_port
 
 #: share of the bus that questions and their answers may take at most
@@ -50,6 +51,8 @@ _PATIENCE = 0.005
 _SEND_TIMEOUT = 0.05
 #: frames in a row that the bus refuses, until nothing more is sent
 _REFUSED_MAX = 5
+#: bit/s where nobody says another rate
+DEFAULT_BITRATE = 125_000
 
 
 class BusScan:
@@ -277,8 +280,9 @@ def define(parser: ArgumentParser) -> None:
         'usage, or a question that could not be asked.')
     parser.add_argument('--interface', required=True, help='python-can interface: socketcan, …')
     parser.add_argument('--channel', required=True, help='what it calls its channel: can0, …')
-    parser.add_argument('--bitrate', type=bitrate, default=125_000, metavar='B',
-                        help='bit/s, also as 500k (default: 125k)')
+    parser.add_argument('--bitrate', type=bitrate, metavar='B',
+                        help='bit/s, also as 500k (default: what the interface is set to, and '
+                             f'{DEFAULT_BITRATE // 1000}k where the adapter has to be told)')
     parser.add_argument('--option', action='append', default=[], metavar='KEY=VALUE',
                         type=_option, help='a key of the adapter, as in a parameter file: '
                                            'host=10.0.0.5; as often as needed')
@@ -341,8 +345,10 @@ def _bus(args: Namespace) -> BusConfiguration:
 
     :raises WrongUsage: an option that the bridge sets, or one that is missing.
     """
+    _find_bitrate(args)
     options = dict(args.option)
-    keys = {'interface': args.interface, 'channel': args.channel, 'bitrate': args.bitrate}
+    keys = {'interface': args.interface, 'channel': args.channel,
+            'bitrate': args.bitrate or DEFAULT_BITRATE}
     wrong = next((key for key in options if key in keys), None)
     if wrong is not None:
         raise WrongUsage(command_sentences.option_of_its_own(wrong=wrong, option=wrong))
@@ -360,6 +366,21 @@ def _bus(args: Namespace) -> BusConfiguration:
         if warning.startswith('buses.main.'):
             complain(f'warning: --option {warning.removeprefix("buses.main.")}')
     return found.buses['main']
+
+
+def _find_bitrate(args: Namespace) -> None:
+    """Set the bit rate to that of the interface, or to one that is assumed, with a warning."""
+    if args.bitrates:
+        return
+    found = 0 if args.interface != 'socketcan' else next(
+        (each.bitrate for each in kernel_interfaces() if each.name == args.channel), 0)
+    if found:
+        if args.bitrate not in (None, found):
+            complain(command_sentences.bitrate_of_interface(args.bitrate, args.channel, found))
+        args.bitrate = found
+    elif args.bitrate is None and 'bitrate' in (adapter_keywords(args.interface) or ()):
+        args.bitrate = DEFAULT_BITRATE
+        complain(command_sentences.bitrate_not_given(bitrate=DEFAULT_BITRATE))
 
 
 def _scan(args: Namespace, bus: BusConfiguration) -> int:
@@ -408,7 +429,8 @@ def _ask(args: Namespace, scan: BusScan) -> list[str]:
 def _tell_left_out(args: Namespace, scan: BusScan, asked: Sequence[str]) -> None:
     """Print the bit rate, and what was not asked, and how to ask it."""
     left = [name for name in FAMILIES if name not in asked]
-    told = f'{args.bitrate} bit/s, {scan.frames} frames heard'
+    told = f'{args.bitrate} bit/s, ' if args.bitrate else ''
+    told += f'{scan.frames} frames heard'
     if args.passive:
         told += '; nothing was asked: --passive'
     elif left and not scan.master and not scan.nodes and not scan.trouble:
@@ -422,7 +444,7 @@ def _tell_left_out(args: Namespace, scan: BusScan, asked: Sequence[str]) -> None
 def _command(args: Namespace) -> str:
     """Return the command line for the same scan again."""
     words = ['drive_can', 'scan', '--interface', args.interface, '--channel', args.channel,
-             '--bitrate', str(args.bitrate)]
+             *(('--bitrate', str(args.bitrate)) if args.bitrate else ())]
     for key, value in args.option:
         words += ['--option', f'{key}={value if isinstance(value, str) else json.dumps(value)}']
     if args.protocols:

@@ -247,6 +247,14 @@ waiting_for_drive = Text(
 probe_unacknowledged = Text(
     'bus {bus}: {error}: no other node acknowledges',
     do='switch on the drive; check cable, termination and bit rate')
+bitrate_not_given = Text(
+    'warning: --bitrate is not given: {bitrate} bit/s is assumed; an adapter at another rate than '
+    'the drives disturbs their bus',
+    do='give the bit rate of the drives: a display, a switch or their manual shows it')
+bitrate_of_interface = Text(
+    'warning: --bitrate {given} does not change the interface: {name} is set to {bitrate} bit/s '
+    '(ip link set {name} down, then: ip link set {name} up type can bitrate {given})',
+    do='leave --bitrate away, or set the interface to that of the drives')
 scan_unacknowledged = Text(
     '{error}: no other node acknowledges',
     do='switch on a drive; check cable, termination and bit rate')
@@ -279,7 +287,8 @@ not_asked_beside_canopen = Text(
     do='ask it on a bus of its own')
 nothing_answered = Text(
     'nothing was heard: no drive answers at this bit rate; check power, cable and termination, '
-    'try --bitrates, and --protocols for drives with 11-bit identifiers',
+    'try the other bit rate that a drive shows or its manual names (--bitrate), and --protocols '
+    'for drives with 11-bit identifiers',
     do='check these; give --protocols for drives with 11-bit identifiers')
 nothing_heard = Text(
     'nothing was heard: drives speak when they are asked',

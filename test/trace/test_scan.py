@@ -6,6 +6,7 @@ import json
 import os
 from pathlib import Path
 from random import Random
+from typing import NoReturn
 
 from asked_bus import AskedBus, drive_can, takes_nothing
 from extent import SEED
@@ -18,15 +19,19 @@ from test_trace_agrees import running
 from transcripts import replayed, stories
 from world import World
 
+from drive_can_bridge.cli import scan as scan_command
 from drive_can_bridge.cli.scan import BusScan, LOAD_MAX, write_parameter_file
 from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BusConfiguration
+from drive_can_bridge.core.errors import BusUnavailable
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.datamodel.extended import DIR
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.scanner import Certainty, Scanner, Sighting
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.simulation import Simulation
+from drive_can_bridge.transport.kernel_interfaces import KernelInterface
 
 STORIES = stories(__file__, 'scan.yaml')
 #: what is said of a bus, and of what was asked
@@ -539,6 +544,37 @@ def test_what_was_not_asked_is_named_with_the_next_command(
         output = tmp_path / 'found.yaml'
         assert drive_can(*again.split()[1:], '--listen', 0.1, '-o', output) == 0
         assert capsys.readouterr().err.splitlines()[-1] == SAID['next'].format(output)
+
+
+@pytest.mark.usefixtures('bench')
+@pytest.mark.parametrize(('interface', 'set_to', 'given', 'used', 'warning'), [
+    ('virtual', 0, None, None, ''),      # takes none, and has none
+    ('slcan', 0, None, 125_000, command_sentences.bitrate_not_given(125_000)),
+    ('slcan', 0, 500_000, 500_000, ''),
+    ('socketcan', 250_000, None, 250_000, ''),
+    ('socketcan', 250_000, 250_000, 250_000, ''),
+    ('socketcan', 250_000, 500_000, 250_000,
+     command_sentences.bitrate_of_interface(500_000, 'can9', 250_000)),
+    ('socketcan', 0, None, None, ''),    # vcan
+    ('socketcan', 0, 500_000, 500_000, '')])
+def test_the_bit_rate_of_the_interface_goes_before_any_other(
+        interface: str, set_to: int, given: int | None, used: int | None, warning: str,
+        capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = []
+
+    def no_port(bus: BusConfiguration, *_: object) -> NoReturn:
+        opened.append(bus)
+        raise BusUnavailable('not today')
+    monkeypatch.setattr(scan_command, 'open_port', no_port)
+    monkeypatch.setattr(scan_command, 'kernel_interfaces', lambda: [
+        KernelInterface('can8', 8, True, 'can', 10_000),
+        KernelInterface('can9', 9, True, 'can', set_to)])
+    rate = () if given is None else ('--bitrate', given)
+    assert drive_can('scan', '--interface', interface, '--channel',
+                     '/dev/null' if interface == 'slcan' else 'can9', *rate) == 1
+    assert opened[0].bitrate == (used or 125_000)
+    *told, _ = capsys.readouterr().err.splitlines()
+    assert told == ([warning] if warning else [])
 
 
 @pytest.mark.usefixtures('bench')
