@@ -54,7 +54,7 @@ COMPILED = {
     'protocols/datamodel/extended_session': 'the family with the most drives on a bus',
     'protocols/datamodel/process_words': 'each of its telegrams',
     'protocols/exchange_book': 'each cycle and each answer: when the next is due',
-    'protocols/life': 'each pass: whether the script of a drive is due',
+    'protocols/lifecycle': 'each pass: whether the script of a drive is due',
     'ros/commands': 'each command',
     'ros/drive_node': 'each sample and each command',
     'ros/polled_topics': 'each cycle: what waits on command topics',

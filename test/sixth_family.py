@@ -40,7 +40,7 @@ from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import (
-    Claim, Complaint, Family, option, out_of_range, Talk)
+    Claim, Complaint, Family, FamilyParts, option, out_of_range)
 from drive_can_bridge.protocols.observer import DriveObserver, Emit, raws_of, TelegramKind
 from drive_can_bridge.protocols.pairing import CyclicWatch, PendingRequests, RequestContent
 from drive_can_bridge.protocols.scanner import (
@@ -333,8 +333,8 @@ class Toy(Family):
         match = re.fullmatch('p([0-9]{1,4})', name)
         return None if match is None else Parameter(name, number=int(match[1]), listed=False)
 
-    def talk(self) -> Talk:
-        return Talk(ToySession, ToyObserver, ToyScanner, ToyProber)
+    def parts(self) -> FamilyParts:
+        return FamilyParts(ToySession, ToyObserver, ToyScanner, ToyProber)
 
 
 # -- simulated ------------------------------------------------------------------------------------

@@ -301,7 +301,7 @@ def test_ros_packages_are_declared() -> None:
 # -- names ----------------------------------------------------------------------------------------
 
 #: modules that each family has under the same name; those for all families stand above them
-FLOOR_PLAN = {'control', 'family', 'observer', 'options', 'prober', 'procedures', 'scanner',
+FLOOR_PLAN = {'family', 'observer', 'options', 'prober', 'procedures', 'scanner',
               'session', 'states', 'transactor'}
 
 

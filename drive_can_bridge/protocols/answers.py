@@ -13,7 +13,7 @@ from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
 from drive_can_bridge.protocols.exchange_book import CycleTimer, ExchangeBook
-from drive_can_bridge.protocols.slack import Slack
+from drive_can_bridge.protocols.timing_advice import TimingAdvice
 
 
 class CycleAnswers:
@@ -36,7 +36,7 @@ class CycleAnswers:
                  in_turn: bool = False, timer: CycleTimer | None = None,
                  period_max: float = math.inf) -> None:
         self.session = session
-        self.slack = Slack(session.configuration, session.report, period_max)
+        self.timing = TimingAdvice(session.configuration, session.report, period_max)
         self.book = ExchangeBook(session.configuration, session.statistics, timer)
         self.heeded = True
         self._silent = sentences.silent(silence, advice)
@@ -75,8 +75,8 @@ class CycleAnswers:
                 self.book.too_many(received_at)
             self.session.report.unasked(
                 sentences.unasked(what), late, now, would_hold=self._would_hold)
-        if self.slack.since < math.inf:
-            self.slack.came(received_at)
+        if self.timing.since < math.inf:
+            self.timing.came(received_at)
         self._heed()
         return False
 
@@ -86,15 +86,15 @@ class CycleAnswers:
         missed = not book.awaiting
         book.answered(received_at)
         book.heard(received_at)
-        if self.slack.since < math.inf:
-            self.slack.came(received_at)
+        if self.timing.since < math.inf:
+            self.timing.came(received_at)
         if missed:
             self.session.report.unasked(
                 NOTHING, book.overdue, received_at, would_hold=self._would_hold, taken=True)
         self._heed()
 
     def _would_hold(self, late: float) -> Sentence:
-        return self.slack.late(late) if self.session.online else NOTHING
+        return self.timing.late(late) if self.session.online else NOTHING
 
     @property
     def wanted(self) -> bool:
@@ -133,7 +133,7 @@ class CycleAnswers:
             if session.stage is not Stage.STOPPING:
                 limit = session.configuration.missed_limit
                 if too_many and session.online:
-                    self.slack.lost(book.answered_at)
+                    self.timing.lost(book.answered_at)
                 session.exchange_missed(
                     sentences.silent_for_cycles(self._silence, limit) if too_many else NOTHING,
                     now)

@@ -39,7 +39,7 @@ EXPIRY_SPACING = 0.05
 TelegramT = TypeVar('TelegramT')
 
 
-class Teller(Protocol[TelegramT]):
+class CycleSender(Protocol[TelegramT]):
     """What a family says about its cycles: its session, or that of several."""
 
     def encode_cycle(self, raws: list[int]) -> TelegramT:
@@ -92,13 +92,13 @@ class CyclicExchange(Generic[TelegramT]):
     :ivar again: this cycle follows one of which the bus has not taken everything.
     """
 
-    def __init__(self, answers: CycleAnswers, teller: Teller[TelegramT], *,
+    def __init__(self, answers: CycleAnswers, sender: CycleSender[TelegramT], *,
                  slot: int | None) -> None:
         self.audience = [answers]
         self.timer: CycleTimer = answers.book.timer
         self.cycles_left = -1
         self.again = False
-        self._answers, self._session, self._teller = answers, answers.session, teller
+        self._answers, self._session, self._sender = answers, answers.session, sender
         self._slot = slot
         self._cycle: Cycle[TelegramT] | None = None
         self._raws: list[int] | None = None     # in it, until it has left
@@ -172,7 +172,7 @@ class CyclicExchange(Generic[TelegramT]):
         answers.book.begin(now, timer.stop_spacing if self.cycles_left >= 0 else None)
         self._frames_out = 0
         self.again, self._whole = not self._whole, True
-        self._teller.send_cycle(cycle.telegram, now)
+        self._sender.send_cycle(cycle.telegram, now)
 
     def _expire(self, now: float) -> bool:
         """Make setpoints neutral that no fresh command keeps; return whether there were any."""
@@ -264,7 +264,7 @@ class CyclicExchange(Generic[TelegramT]):
                 runs = runs or not control.at_rest
         session.setpoints.changed = False
         self._raws = raws
-        return Cycle(self._teller.encode_cycle(raws), word, runs)
+        return Cycle(self._sender.encode_cycle(raws), word, runs)
 
     def _left(self, to: Iterable[CycleAnswers], sent: bool, now: float) -> None:
         """
@@ -336,7 +336,7 @@ class CyclicExchange(Generic[TelegramT]):
             self._ending = Ending.WAITING_LONGER if self.insisting else Ending.WAITING
             self.timer.start(now + LAST_ANSWER)
         else:
-            self._teller.last_cycle_left(now)
+            self._sender.last_cycle_left(now)
 
     def _insist(self, now: float) -> None:
         """Send more cycles to those that have not acknowledged one; end it, if there are none."""
@@ -355,7 +355,7 @@ class CyclicExchange(Generic[TelegramT]):
 
     def _end(self, now: float) -> None:
         self._ending, self.cycles_left = Ending.LAST, 0
-        self._teller.last_cycle_left(now)
+        self._sender.last_cycle_left(now)
 
     def end_stop(self) -> None:
         """End the stop of all: nothing more is sent."""

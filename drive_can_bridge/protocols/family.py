@@ -177,7 +177,7 @@ class ModeKey(NamedTuple):
     setpoints: tuple[str, ...]
 
 
-class Talk(NamedTuple):
+class FamilyParts(NamedTuple):
     """What makes those who talk to the drives of a family, or listen to them."""
 
     session: Callable[[DriveConfiguration], Session]
@@ -342,7 +342,7 @@ class Family(ABC):
     # -- who talks and listens --------------------------------------------------------------------
 
     @abstractmethod
-    def talk(self) -> Talk:
+    def parts(self) -> FamilyParts:
         """Import who talks and listens to drives: checks of a configuration need none of it."""
 
     def make_session(self, drive: DriveConfiguration) -> Session:
@@ -351,7 +351,7 @@ class Family(ABC):
 
     def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
         """Make the sessions of all drives of this family on one bus, in the same order."""
-        return [self.talk().session(drive) for drive in drives]
+        return [self.parts().session(drive) for drive in drives]
 
     def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
                        ) -> list[DriveObserver]:
@@ -362,12 +362,12 @@ class Family(ABC):
         :return: one for each drive, in the same order; then those of frames that are of no drive
             in particular, whose name is ''.
         """
-        return [self.talk().observer(drive, emit) for drive in drives]
+        return [self.parts().observer(drive, emit) for drive in drives]
 
     def make_scanner(self) -> Scanner:
         """Make what looks for drives of this family on a bus that nobody has described."""
-        return self.talk().scanner()
+        return self.parts().scanner()
 
     def make_prober(self, drive: DriveConfiguration) -> Prober:
         """Make what settles the open keys of a drive by harmless reads."""
-        return self.talk().prober(drive)
+        return self.parts().prober(drive)

@@ -19,7 +19,7 @@ from drive_can_bridge.core.messages import NOTHING
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
-from drive_can_bridge.protocols.slack import Slack
+from drive_can_bridge.protocols.timing_advice import TimingAdvice
 
 #: s by which sums of times are wrong
 TOLERANCE = 1e-6
@@ -125,7 +125,7 @@ class PolledExchange:
         self._session, self._rounds = session, rounds
         self._channel = channel
         self._book = ExchangeBook(session.configuration, session.statistics)
-        self.slack = Slack(session.configuration, session.report)
+        self.timing = TimingAdvice(session.configuration, session.report)
         self._void = False  # this round began before the process stood still
         self.timer = self._book.timer
         self.reading = False
@@ -175,7 +175,7 @@ class PolledExchange:
             self._miss(now)
             return
         self.forget()
-        self.slack.came(self.received_at)
+        self.timing.came(self.received_at)
         fresh = not session.online
         if fresh:
             if not self._rounds.present:
@@ -195,5 +195,5 @@ class PolledExchange:
         session, limit = self._session, self._session.configuration.missed_limit
         too_many = self._book.missed()
         if too_many and session.online:
-            self.slack.lost(self._book.answered_at)
+            self.timing.lost(self._book.answered_at)
         session.exchange_missed(sentences.no_round(limit) if too_many else NOTHING, now)

@@ -14,7 +14,7 @@ from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.setpoints import Setpoint
 from drive_can_bridge.core.stop_duty import Do, StopDuty
 from drive_can_bridge.protocols.cia402.sdo_stop import SdoStop
-from drive_can_bridge.protocols.cia402.standing import Standing
+from drive_can_bridge.protocols.cia402.standstill import Standstill
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 from drive_can_bridge.protocols.safe_stop import SafeStop
@@ -104,7 +104,7 @@ DEFECTS: list[tuple[type, str, Any, str, Story]] = [
     (SdoStop, '_may_be_stopped', lambda self, since: False, 'CiA 402',
      (('nmt stop', 0.0), ('end', 0.0))),
     (Setpoint, 'disarm', _nothing, '29 bit, no word', (('quiet', 0.9),)),
-    (Standing, 'holds', property(lambda self: self.watching), 'CiA 402, stays in quick stop',
+    (Standstill, 'holds', property(lambda self: self.watching), 'CiA 402, stays in quick stop',
      (('quick_stop', 0.9), ('disable', 0.0))),
 ]
 

@@ -280,7 +280,7 @@ def test_a_longer_period_would_have_held_for_what_is_late() -> None:
         talk.answer(at)
     late = says('longer_period_would_hold', late=pytest.approx(0.009), period=0.032)
     assert talk.session.take_events() == [AnswerLate(pytest.approx(0.009), late)]
-    assert talk.session.answers.slack.late(0.009) == '', 'that is known by now'
+    assert talk.session.answers.timing.late(0.009) == '', 'that is known by now'
 
 
 def test_an_answer_that_is_late_and_taken_all_the_same_loses_nothing() -> None:

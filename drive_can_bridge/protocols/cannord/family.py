@@ -18,7 +18,7 @@ from drive_can_bridge.protocols.cannord.parameter_frame import INDEX_MAX, NUMBER
 from drive_can_bridge.protocols.cannord.process_data import (
     EXTRA_LENGTH, EXTRA_VALUES, main_length, MAIN_VALUES)
 from drive_can_bridge.protocols.family import (
-    Claim, Complaint, Family, out_of_range, ScanEntry, Talk)
+    Claim, Complaint, Family, FamilyParts, out_of_range, ScanEntry)
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 
 #: s that an inverter takes at most to answer process data (BU 0060 page 50)
@@ -122,19 +122,19 @@ class Cannord(Family):
         return timeout_parameter(drive.profile) or self.raw_parameter(
             drive, f'p{TIMEOUT_NUMBER}')
 
-    def talk(self) -> Talk:
+    def parts(self) -> FamilyParts:
         from drive_can_bridge.protocols.cannord.observer import CannordObserver
         from drive_can_bridge.protocols.cannord.prober import CannordProber
         from drive_can_bridge.protocols.cannord.scanner import CannordScanner
         from drive_can_bridge.protocols.cannord.session import CannordSession
-        return Talk(CannordSession, CannordObserver, CannordScanner, CannordProber)
+        return FamilyParts(CannordSession, CannordObserver, CannordScanner, CannordProber)
 
     def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
         from drive_can_bridge.protocols.cannord.session import make_group
         made: dict[str, Session] = {
             session.configuration.name: session for group in groups(drives)
             for session in make_group(group)}
-        return [made.get(drive.name) or self.talk().session(drive) for drive in drives]
+        return [made.get(drive.name) or self.parts().session(drive) for drive in drives]
 
     def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
                        ) -> list[DriveObserver]:

@@ -28,7 +28,7 @@ from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.protocols.answers import CycleAnswers
-from drive_can_bridge.protocols.cannord.control import make_control
+from drive_can_bridge.protocols.cannord.control_words import make_control
 from drive_can_bridge.protocols.cannord.identifiers import broadcast_identifier
 from drive_can_bridge.protocols.cannord.process_data import (
     encode_extra, encode_main, main_length, MAIN_VALUES, Samples, values_needed)

@@ -35,7 +35,7 @@ from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.protocols.answers import CycleAnswers
 from drive_can_bridge.protocols.cannord import procedures
-from drive_can_bridge.protocols.cannord.control import make_control
+from drive_can_bridge.protocols.cannord.control_words import make_control
 from drive_can_bridge.protocols.cannord.group import Group, GroupMember
 from drive_can_bridge.protocols.cannord.identifiers import broadcasts, identifier, MessageObject
 from drive_can_bridge.protocols.cannord.monitoring import TimeoutWatch

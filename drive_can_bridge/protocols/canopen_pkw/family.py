@@ -17,7 +17,7 @@ from drive_can_bridge.protocols.canopen_pkw import addresses, pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.options import PkwOptions, PROBED
 from drive_can_bridge.protocols.family import (
-    Claim, Complaint, Family, ImportRules, ScanEntry, Talk)
+    Claim, Complaint, Family, FamilyParts, ImportRules, ScanEntry)
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 from drive_can_bridge.protocols.polled_exchange import round_time
 
@@ -116,12 +116,12 @@ class CanopenPkw(Family):
         return (f'The entries are CANopen objects: a drive of {self.name} that uses them needs '
                 '"addressing: canopen".')
 
-    def talk(self) -> Talk:
+    def parts(self) -> FamilyParts:
         from drive_can_bridge.protocols.canopen_pkw.observer import PkwObserver
         from drive_can_bridge.protocols.canopen_pkw.prober import PkwProber
         from drive_can_bridge.protocols.canopen_pkw.scanner import CanopenScanner
         from drive_can_bridge.protocols.canopen_pkw.session import PkwSession
-        return Talk(PkwSession, PkwObserver, CanopenScanner, PkwProber)
+        return FamilyParts(PkwSession, PkwObserver, CanopenScanner, PkwProber)
 
     def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
                        ) -> list[DriveObserver]:

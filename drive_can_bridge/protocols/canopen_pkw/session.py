@@ -16,7 +16,7 @@ Whatever the reason: the control word goes back to ``disable``, setpoints go neu
 re-arming. A drive that was told to run is told to stand still at once, whatever is known of the
 node: what is only silent may still be listening.
 
-How it is looked for is one script (:meth:`PkwSession._life`), begun at the start, when the
+How it is looked for is one script (:meth:`PkwSession._script`), begun at the start, when the
 bus is back, after a stall, when the node has restarted or says that it takes no PDOs, when the
 drive is lost; it ends when the drive is found. NMT *start* goes out when the bridge starts, after
 a boot-up frame, when a heartbeat says that the node is not operational, and once a second; never
@@ -46,10 +46,10 @@ from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.canopen import masters, network, sdo
-from drive_can_bridge.protocols.canopen.heard import Heard
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import (
     HeartbeatWatch, NodeChange, START_PERIOD, START_SPACING, WatchedNode)
+from drive_can_bridge.protocols.canopen.offline_traffic import OfflineTraffic
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
 from drive_can_bridge.protocols.canopen_pkw.pkw import PkwLayout, PkwMessage
 from drive_can_bridge.protocols.canopen_pkw.rounds import Rounds
@@ -57,7 +57,7 @@ from drive_can_bridge.protocols.canopen_pkw.transactor import (
     MailboxChannel, MailboxTransactor, Procedure)
 from drive_can_bridge.protocols.canopen_pkw.writers import ExpiryWatch, Writers
 from drive_can_bridge.protocols.channel import Priority
-from drive_can_bridge.protocols.life import Life, Script
+from drive_can_bridge.protocols.lifecycle import Lifecycle, Script
 from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
 
 #: what a node sends beside the answers of its mailbox; plus its number
@@ -78,7 +78,7 @@ class PkwSession(Session):
         options, placement = drive.options, addresses.Placement.of(drive)
         self._layout = PkwLayout(options.layout)
         self._node = WatchedNode(drive.station, heartbeat_timeout=options.heartbeat_timeout)
-        self._heard = Heard('no complete round of reads')
+        self._offline_traffic = OfflineTraffic('no complete round of reads')
         self._started_at = -math.inf    # by NMT, the last time
         self._transactor = MailboxTransactor(
             self._send, order=options.abort_code_order, retry=self.retry,
@@ -89,9 +89,9 @@ class PkwSession(Session):
         self._exchange = PolledExchange(self, self, self._channel)
         self.services = DriveServices(
             self, procedures.RegisterAccess(self._channel, self.retry, placement))
-        self._course = Life(self._channel)
+        self._lifecycle = Lifecycle(self._channel)
         self.look_after(
-            self._course, HeartbeatWatch(self, self._node), channel=self._channel,
+            self._lifecycle, HeartbeatWatch(self, self._node), channel=self._channel,
             behind_control=[ExpiryWatch(self, self._writers)])
 
     # -- life cycle -------------------------------------------------------------------------------
@@ -102,7 +102,7 @@ class PkwSession(Session):
             owes or self.ever_online and now >= self._node.free_at)
 
     def begin_stop(self, now: float) -> bool:
-        self._course.end()
+        self._lifecycle.end()
         self._exchange.stop()
         self._channel.drop(now)
         self._writers.stop(now)
@@ -143,7 +143,7 @@ class PkwSession(Session):
         return not self._node.heartbeat_lost
 
     def round_found(self, now: float) -> None:
-        self._course.end()
+        self._lifecycle.end()
         self.be_online()
         self._writers.forget()
         self.control_changed(now)
@@ -158,7 +158,7 @@ class PkwSession(Session):
 
     def lost(self, now: float, *, was_online: bool) -> None:
         if was_online:
-            self._heard.clear()
+            self._offline_traffic.clear()
         self._forget_exchange()
 
     def _forget_exchange(self) -> None:
@@ -172,7 +172,7 @@ class PkwSession(Session):
 
     # -- the node ---------------------------------------------------------------------------------
 
-    def _life(self, now: float, start_at: float) -> Script:
+    def _script(self, now: float, start_at: float) -> Script:
         """
         Start the node again and again, until the drive is found.
 
@@ -187,13 +187,13 @@ class PkwSession(Session):
 
     def _look_for_it(self, now: float, start_at: float, *, needed: bool = True) -> None:
         """
-        Restart the life.
+        Restart the script.
 
         :param needed: the node has to be started: a moment later it takes PDOs.
         """
         if needed and self.configuration.options.nmt_start:
             self._node.started(start_at)
-        self._course.start(self._life(now, start_at), now)
+        self._lifecycle.start(self._script(now, start_at), now)
 
     def _begin_rounds(self, now: float) -> None:
         """Send nothing before the node takes PDOs but what stops its drive; then look for it."""
@@ -206,14 +206,14 @@ class PkwSession(Session):
         change = self._node.receive_heartbeat(state, now)
         if self.stage is not Stage.RUNNING or change is NodeChange.NONE:
             return
-        self._exchange.slack.heartbeat(self._node.silent_for)
+        self._exchange.timing.heartbeat(self._node.silent_for)
         if change is NodeChange.OPERATIONAL:
             self._look_for_it(now, self._started_at + START_PERIOD, needed=False)
         else:       # before a stop: the node hears that only when it was started
             self._look_for_it(now, max(now, self._started_at + START_SPACING))
         if change is NodeChange.RESTARTED:
             self.report.note(Noted(sentences.booted()))
-            self._exchange.slack.forget()
+            self._exchange.timing.forget()
             reason = sentences.device_restarted()
             self._close(reason, Failure(
                 FailureKind.NO_ANSWER, sentences.no_answer_because(reason)), now)
@@ -301,7 +301,7 @@ class PkwSession(Session):
         options = self.configuration.options
         if not self.online and (identifier == options.response_cob_id
                                 or identifier - self._node.number in _NODE_SAYS):
-            self._heard.came(now)
+            self._offline_traffic.came(now)
         try:
             if identifier == options.response_cob_id:
                 self._writers.again.heard(now)
@@ -327,11 +327,11 @@ class PkwSession(Session):
         except RemoteProtocolError as error:
             self.report.reject(sentences.malformed(error.sentence))
             if not self.online:
-                self._heard.wrong(sentences.answers_otherwise(error.sentence), now)
+                self._offline_traffic.wrong(sentences.answers_otherwise(error.sentence), now)
 
     @property
     def offline_advice(self) -> Sentence:
-        return self.defect or self._heard.instead_of(
+        return self.defect or self._offline_traffic.instead_of(
             self.report.advice, self._node, self._channel.now)
 
     # -- timer ------------------------------------------------------------------------------------

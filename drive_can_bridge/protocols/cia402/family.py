@@ -22,7 +22,7 @@ from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, CONTROL_WORD, INTERPOLATION_MAX, MODE, MODES, MOVING, state_of,
     STATUS_PARAMETER, STATUS_WORD)
 from drive_can_bridge.protocols.family import (
-    Claim, Complaint, Family, ImportRules, ModeKey, ScanEntry, Talk)
+    Claim, Complaint, Family, FamilyParts, ImportRules, ModeKey, ScanEntry)
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 
 #: s: periods of which the jitter of a process without a real-time kernel is a good part
@@ -156,12 +156,12 @@ class Cia402(Family):
     def tells_enabled(self, drive: DriveConfiguration) -> tuple[Parameter, Callable[[int], bool]]:
         return STATUS_PARAMETER, lambda word: state_of(word) in MOVING
 
-    def talk(self) -> Talk:
+    def parts(self) -> FamilyParts:
         from drive_can_bridge.protocols.cia402.observer import Cia402Observer
         from drive_can_bridge.protocols.cia402.prober import Cia402Prober
         from drive_can_bridge.protocols.cia402.scanner import Cia402Scanner
         from drive_can_bridge.protocols.cia402.session import Cia402Session
-        return Talk(Cia402Session, Cia402Observer, Cia402Scanner, Cia402Prober)
+        return FamilyParts(Cia402Session, Cia402Observer, Cia402Scanner, Cia402Prober)
 
     def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
         """Make the sessions of one bus, which share SYNC and the heartbeat of the bridge."""

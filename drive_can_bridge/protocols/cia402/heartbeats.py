@@ -10,7 +10,7 @@ from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.cia402.watch import WATCH_INTERVALS
-from drive_can_bridge.protocols.slack import enough, Slack
+from drive_can_bridge.protocols.timing_advice import enough, TimingAdvice
 
 #: s for which the longest pause between two heartbeats is remembered
 GAP_TIME = 5.0
@@ -81,14 +81,14 @@ class HeartbeatSender:
         if self._heartbeat is not None:
             self._heartbeat.rest()
 
-    def was_missed(self, slack: Slack, now: float) -> None:
+    def was_missed(self, timing: TimingAdvice, now: float) -> None:
         """Report what would have held: the drive has missed that of the bridge."""
         if self._heartbeat is None:     # whose else it watches, it does not say
             return
         interval = self._session.configuration.options.bridge_heartbeat
         gap = self._heartbeat.gap(now)
         if gap > (WATCH_INTERVALS - 0.5) * interval:
-            slack.tell('bridge_heartbeat', sentences.longer_beat_would_hold(
+            timing.tell('bridge_heartbeat', sentences.longer_beat_would_hold(
                 gap=gap, interval=enough(gap / WATCH_INTERVALS)))
         else:
-            slack.tell('1016h', sentences.beats_were_sent(gap=gap))
+            timing.tell('1016h', sentences.beats_were_sent(gap=gap))

@@ -31,9 +31,9 @@ from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cia402 import states
-from drive_can_bridge.protocols.cia402.bring_up import LOOK_PERIOD
-from drive_can_bridge.protocols.cia402.control import DriveRules
-from drive_can_bridge.protocols.cia402.standing import Band, IN_A_ROW, LONG, place_of, STILL
+from drive_can_bridge.protocols.cia402.node_set_up import POLL_PERIOD
+from drive_can_bridge.protocols.cia402.standstill import Band, IN_A_ROW, LONG, place_of, STILL
+from drive_can_bridge.protocols.cia402.state_machine import DriveRules
 from drive_can_bridge.protocols.cia402.transactor import Procedure, SdoChannel, Transfer
 
 _DONE = states.BIT_12 | states.TARGET_REACHED
@@ -77,7 +77,7 @@ class Homing:
         self._request: ControlRequest | None = None
         self._step = HomingStep.NONE
         self.due = math.inf
-        self._standing = rules.standing
+        self._standstill = rules.standstill
         self._latches = [Band(place_of(each.parameter, each.measured))
                          for each in session.setpoints.held]
         # samples in which axes stay in their bands; the oldest one is latched
@@ -175,7 +175,7 @@ class Homing:
         if failed and (self._no_error or self._now - self._started_at >= STILL):
             self._end(sentences.homing_failed())
         elif not done:
-            self._standing.end()
+            self._standstill.end()
         elif self._lowered or self._done_at_once():
             self._end(NOTHING)
 
@@ -183,9 +183,9 @@ class Homing:
         """Return whether it was done before that could be seen: its bits stand, and so does it."""
         if self._on_the_spot:
             return self._done_in_a_row >= IN_A_ROW
-        band = self._standing.band
+        band = self._standstill.band
         if self._done_in_a_row == 1 or band.left > 1 or band.creeps:
-            self._standing.begin(self._now)
+            self._standstill.begin(self._now)
             self._done_since = self._now
         duration = max(STILL, _AT_ONCE * self._session.configuration.control_timeout)
         return band.seen_at - self._done_since >= duration
@@ -207,7 +207,7 @@ class Homing:
             drive.control_timeout + LONG, _LATCHING_PERIODS * drive.period)
         self._rules.homing_bits = 0
         self._stay.clear()
-        self._standing.begin(self._now)
+        self._standstill.begin(self._now)
         self._go(HomingStep.LATCHING)
 
     def _latch(self, raws: Sequence[int], behind: bool) -> None:
@@ -228,9 +228,9 @@ class Homing:
         self._stay.append(raws)
         # not by bit 10: with bit 4 low it says no more than that homing was ended
         if not setpoints.held or len(self._stay) == self._stay.maxlen and (
-                not self._failure or self._standing.stands):
+                not self._failure or self._standstill.stands):
             setpoints.measure(self._stay[0], driven=False)
-            self._standing.end()
+            self._standstill.end()
             self.due = math.inf
             self._go(HomingStep.HOLDING)
 
@@ -289,7 +289,7 @@ class Homing:
                 shown = yield Transfer(states.MODE_SHOWN)
                 if shown.abort is not None or shown.data and shown.data[0] == mode:
                     break
-                yield Transfer(pause=LOOK_PERIOD)
+                yield Transfer(pause=POLL_PERIOD)
             else:
                 return sentences.mode_refused(mode)
             if mode == states.HOMING_MODE:

@@ -28,7 +28,7 @@ from drive_can_bridge.protocols.cia402.transactor import Procedure, SdoChannel, 
 #: s that a drive may take to show what it was sent
 LIMIT_TIME = 0.5
 #: s between two looks
-LOOK_PERIOD = 0.02
+POLL_PERIOD = 0.02
 
 
 class _Limit:
@@ -143,7 +143,7 @@ class LimitCheck:
                 if in_effect or now >= until:
                     self._judge(limit, shown, sent, in_effect=in_effect)
                     return
-            yield Transfer(pause=LOOK_PERIOD)
+            yield Transfer(pause=POLL_PERIOD)
 
     def _judge(self, limit: _Limit, shown: int, sent: int, *, in_effect: bool) -> None:
         first, limit.looked_for = limit.looked_for is None, sent

@@ -2,9 +2,9 @@
 """
 The conversation with one drive of CiA 402.
 
-Before the first PDO a drive is set up by SDO (:mod:`.bring_up`), and so it is after every loss:
+Before the first PDO a drive is set up by SDO (:mod:`.node_set_up`), and so it is after every loss:
 a node that has restarted has forgotten what was written. That it has power is not needed.
-That, again and again until it is ready to be cycled, is its life (:meth:`Cia402Session._life`).
+That, again and again until it is ready to be cycled, is one script (``_script``).
 A drive that is lost while it is online gets three neutral cycles more before it restarts.
 
 Whatever was told to run is told to stop: by cycles while PDOs flow, otherwise by SDO, which no
@@ -36,33 +36,33 @@ from drive_can_bridge.core.status_reports import Wording
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
 from drive_can_bridge.protocols.answers import CycleAnswers
 from drive_can_bridge.protocols.canopen import masters, network, sdo
-from drive_can_bridge.protocols.canopen.heard import Heard
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen.node import (
     HeartbeatWatch, NodeChange, START_PAUSE, START_PERIOD, START_SPACING, WatchedNode)
+from drive_can_bridge.protocols.canopen.offline_traffic import OfflineTraffic
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.cia402 import states
-from drive_can_bridge.protocols.cia402.beat import Beat, EventTimer, FreeSync, Turn
-from drive_can_bridge.protocols.cia402.bring_up import BringUp, LOOK_PERIOD
-from drive_can_bridge.protocols.cia402.control import control_table, DriveRules, hint
-from drive_can_bridge.protocols.cia402.handover import Handover
 from drive_can_bridge.protocols.cia402.heartbeats import (
     BridgeHeartbeat, common_heartbeat, HeartbeatSender)
 from drive_can_bridge.protocols.cia402.homing import Homing
 from drive_can_bridge.protocols.cia402.limits import LimitCheck
-from drive_can_bridge.protocols.cia402.looks import StateLooks
+from drive_can_bridge.protocols.cia402.node_set_up import NodeSetUp, POLL_PERIOD
 from drive_can_bridge.protocols.cia402.objects import SetUpOutcome, SetUpState
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.procedures import cells, MAP, SdoAccess
 from drive_can_bridge.protocols.cia402.sdo_stop import SdoStop, StopProcedure
-from drive_can_bridge.protocols.cia402.standing import Standing
+from drive_can_bridge.protocols.cia402.setpoint_handshake import SetpointHandshake
+from drive_can_bridge.protocols.cia402.standstill import Standstill
+from drive_can_bridge.protocols.cia402.state_machine import control_table, DriveRules, hint
+from drive_can_bridge.protocols.cia402.state_polls import StatePolls
 from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, INTERPOLATION_MAX, MODES, ServoState, state_of, STATUS_PARAMETER)
 from drive_can_bridge.protocols.cia402.stop_options import OPTIONS, stops_by
+from drive_can_bridge.protocols.cia402.sync import EventTimer, FreeSync, SyncProducer, SyncSlot
 from drive_can_bridge.protocols.cia402.transactor import (
     Procedure, SdoChannel, SdoTransactor, Transfer, TransferResult)
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange, EXPIRY_SPACING
-from drive_can_bridge.protocols.life import Life, Script
+from drive_can_bridge.protocols.lifecycle import Lifecycle, Script
 from drive_can_bridge.protocols.safe_stop import (
     ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS, StopAgain, StopWrite)
 
@@ -79,7 +79,7 @@ class Cia402Session(Session):
     """
     Set-up, PDOs, and parameters by SDO of one drive.
 
-    :param beat: the rounds of its bus; None: it is alone there.
+    :param producer: of SYNC on its bus; None: it is alone there.
     :param heartbeat: that of the bridge on its bus; None: there is none.
     :ivar exchange: its cycles.
     """
@@ -87,12 +87,12 @@ class Cia402Session(Session):
     #: a boot-up frame may come with the answer before it
     looks_ahead = True
 
-    def __init__(self, drive: DriveConfiguration, beat: Beat | None = None,
+    def __init__(self, drive: DriveConfiguration, producer: SyncProducer | None = None,
                  heartbeat: BridgeHeartbeat | None = None) -> None:
         options = drive.options
         table = control_table(options)
-        self._standing = Standing(drive)
-        self._rules = DriveRules(table, options, self, self._standing)
+        self._standstill = Standstill(drive)
+        self._rules = DriveRules(table, options, self, self._standstill)
         control = ControlMachine(
             table, timeout=drive.control_timeout, rules=self._rules,
             wording=Wording(lambda status: state_of(status).value, hint))
@@ -118,36 +118,37 @@ class Cia402Session(Session):
             sdo.REQUEST_BASE + drive.station}
         self._set: dict[int, tuple[int, ...]] = {}      # the TPDOs of this exchange
         self._synchronous: bool = options.transmission == 'sync'
-        self._beat = beat or Beat()
-        self._turn = Turn(drive.period, self._beat, self) if self._synchronous else None
+        self._producer = producer or SyncProducer()
+        self._sync_slot = (
+            SyncSlot(drive.period, self._producer, self) if self._synchronous else None)
         self._answers = CycleAnswers(self, silence='no complete set of PDOs',
                                in_turn=not self._synchronous,
-                               timer=self._turn or EventTimer(drive.period),
+                               timer=self._sync_slot or EventTimer(drive.period),
                                period_max=INTERPOLATION_MAX if MODES[options.mode].interpolated
                                else math.inf)
         self.exchange: CyclicExchange[list[bytes]] = CyclicExchange(self._answers, self, slot=0)
-        self._heard = Heard('no complete set of PDOs')
+        self._offline_traffic = OfflineTraffic('no complete set of PDOs')
         self._heartbeats = HeartbeatSender(self, heartbeat or common_heartbeat([drive]))
         self._limits = LimitCheck(
             [] if options.mapping == 'assume' else [
                 each for each in drive.cyclic_request if each.limit],
             self.sent, self._channel, self._limits_judged)
-        self._bring_up = BringUp(
+        self._node_set_up = NodeSetUp(
             self, self._node, self._rules, self._channel, self._limits,
-            self._beat if self._synchronous else None)
+            self._producer if self._synchronous else None)
         self.homes = options.homing
-        self._handover = Handover(
+        self._handshake = SetpointHandshake(
             self.setpoints, self._rules, drive.control_timeout, self.report,
             ) if options.mode == 'pp' else None
         self._homing = Homing(
             self, control, self._rules, self._channel, MODES[options.mode].number)
-        self._looks = StateLooks(
-            self, control, self._rules, self._channel, self._bring_up, self._homing)
-        self._course = Life(self._channel)
+        self._polls = StatePolls(
+            self, control, self._rules, self._channel, self._node_set_up, self._homing)
+        self._lifecycle = Lifecycle(self._channel)
         self.look_after(
-            self._course, self._heartbeats, HeartbeatWatch(self, self._node), self._homing,
-            self.exchange,
-            *([FreeSync(self, self._beat)] if self._synchronous else ()), channel=self._channel)
+            self._lifecycle, self._heartbeats, HeartbeatWatch(self, self._node), self._homing,
+            self.exchange, *([FreeSync(self, self._producer)] if self._synchronous else ()),
+            channel=self._channel)
         self._stop_until = -math.inf
         self._runs_on = False       # what its stop by SDO has come to
 
@@ -159,25 +160,25 @@ class Cia402Session(Session):
     def _begin(self, now: float, spacing: float) -> None:
         self.exchange.stop()
         self._channel.cancel(Priority.OWN)
-        self._course.stop()
-        self._looks.forget()
+        self._lifecycle.stop()
+        self._polls.forget()
         self._limits.stop()
-        self._standing.forget()
+        self._standstill.forget()
         self._node.begin(now)
-        self._bring_up.forget(now)
+        self._node_set_up.forget(now)
         if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._stop_by_sdo(now)
-        self._course.start(self._life(now, spacing), now)
+        self._lifecycle.start(self._script(now, spacing), now)
 
     def prepare_stop(self, now: float) -> bool:
         self._channel.clear()
-        self._looks.ended()
+        self._polls.ended()
         self._homing.stop()
         self._limits.stop()
         self._stop.forget()
-        self._course.stop()
+        self._lifecycle.stop()
         # the next activation sees for itself
-        found, self._bring_up.moving = self._bring_up.moving, None
+        found, self._node_set_up.moving = self._node_set_up.moving, None
         if self.stage is not Stage.IDLE and not self.exchange.cycling and (
                 self._rules.may_run or found is ServoState.OPERATION_ENABLED):
             # it has acknowledged its stop by SDO, and nobody has seen it disabled since
@@ -187,7 +188,7 @@ class Cia402Session(Session):
             self.report.warn(sentences.still_in_state(found.value), may_run=True)
         owes = self.duty.happened(Happened.ENDS) is Do.STOP
         return self.stage is not Stage.IDLE and (
-            self.exchange.cycling or owes or self._bring_up.watch.slot is not None)
+            self.exchange.cycling or owes or self._node_set_up.watch.slot is not None)
 
     def begin_stop(self, now: float) -> bool:
         self._stop_until = now + self.configuration.control_timeout
@@ -217,26 +218,26 @@ class Cia402Session(Session):
         super().bus_down(now, reason)
 
     def stood_still(self, now: float) -> None:
-        self._beat.shut()
+        self._producer.shut()
         super().stood_still(now)
 
     # -- setting up -------------------------------------------------------------------------------
 
-    def _life(self, now: float, spacing: float) -> Script:
+    def _script(self, now: float, spacing: float) -> Script:
         """
         Set the drive up until it can be cycled, not too often: each time it is sent NMT.
 
         :param spacing: s since the last NMT at least.
         """
-        bring_up, told = self._bring_up, NOTHING
-        again = bring_up.nmt_at + spacing
+        node_set_up, told = self._node_set_up, NOTHING
+        again = node_set_up.nmt_at + spacing
         if again > now:
             now = yield again
         while True:
             self._heartbeats.handle_timer(now)     # to be heard before the drive is to watch it
-            if self._stopped_by_nmt(now) and now >= bring_up.nmt_at + START_PERIOD:
-                bring_up.wake(now)
-            outcome: SetUpOutcome = yield bring_up.run()
+            if self._stopped_by_nmt(now) and now >= node_set_up.nmt_at + START_PERIOD:
+                node_set_up.wake(now)
+            outcome: SetUpOutcome = yield node_set_up.run()
             now, found, text = self._channel.now, outcome.found, outcome.text
             if found is SetUpState.READY:
                 self._start_cycling(outcome.status, now)
@@ -253,11 +254,11 @@ class Cia402Session(Session):
             elif found is SetUpState.RUNS and text != told:
                 self.report.warn(text, may_run=True)
             elif found is SetUpState.SILENT:
-                again = max(now, bring_up.nmt_at + START_PERIOD)
+                again = max(now, node_set_up.nmt_at + START_PERIOD)
             elif found is SetUpState.ABSENT:
                 again = now
-                if now >= bring_up.nmt_at + START_PERIOD:
-                    bring_up.wake(now)      # a node that was stopped answers nothing
+                if now >= node_set_up.nmt_at + START_PERIOD:
+                    node_set_up.wake(now)      # a node that was stopped answers nothing
             told = text or told
             now = yield again
 
@@ -282,7 +283,7 @@ class Cia402Session(Session):
             if self.exchange.cycles_left == 0:
                 self.duty.happened(Happened.SILENT)
                 self.start_over(now)
-        elif reason and not self.online and self._bring_up.starting(now):
+        elif reason and not self.online and self._node_set_up.starting(now):
             self._answers.forget()
             if not self._synchronous:
                 self._expect_set(now)
@@ -301,17 +302,17 @@ class Cia402Session(Session):
         self._answers.forget()
         if not self.online:
             self.exchange.stop()
-            self._course.start(self._life(now, START_PERIOD), now)
+            self._lifecycle.start(self._script(now, START_PERIOD), now)
             return
         self.lose(reason, now)
         self.exchange.run_out(self.exchange.timer.due)
 
     def lost(self, now: float, *, was_online: bool) -> None:
         if was_online:
-            self._heard.clear()
+            self._offline_traffic.clear()
         self._homing.stop()
         self._limits.stop()
-        self._looks.forget()
+        self._polls.forget()
         self._set.clear()
 
     def _close(self, reason: Sentence, now: float, spacing: float) -> None:
@@ -330,8 +331,8 @@ class Cia402Session(Session):
         self._set.clear()
 
     def encode_cycle(self, raws: list[int]) -> list[bytes]:
-        if self._handover is not None:
-            self._handover.carried(raws[0], raws[1:])
+        if self._handshake is not None:
+            self._handshake.carried(raws[0], raws[1:])
         payloads, at = [], 0
         for each in self._requests:
             count = len(each.parameters)
@@ -343,11 +344,11 @@ class Cia402Session(Session):
         exchange = self.exchange
         for each, payload in zip(self._requests, payloads):
             exchange.put(Frame(each.identifier, payload, False))
-        if self._turn is not None:
+        if self._sync_slot is not None:
             if self.online:     # what answers to SYNC of before has come by now
                 self._answers.book.stale = 0
             exchange.expect_answer(now)
-            self._beat.begun(self._turn, now, exchange.await_frame())
+            self._producer.begun(self._sync_slot, now, exchange.await_frame())
         elif not self._answers.book.awaiting:
             self._expect_set(now)
 
@@ -386,29 +387,29 @@ class Cia402Session(Session):
             elif identifier == network.EMERGENCY_BASE + self.configuration.station:
                 self._node.take_emergency(data, self.report)
                 if self._missed_bridge:
-                    self._heartbeats.was_missed(self._answers.slack, now)
+                    self._heartbeats.was_missed(self._answers.timing, now)
         except Unasked as error:
             self.report.unasked(sentences.malformed(error.sentence), self._channel.late(
                 now - age, partial(self._transactor.answers, data)), now)
         except RemoteProtocolError as error:
             self.report.reject(sentences.malformed(error.sentence))
             if not self.online:
-                self._heard.wrong(sentences.answers_otherwise(error.sentence), now)
+                self._offline_traffic.wrong(sentences.answers_otherwise(error.sentence), now)
 
     def _hear(self, identifier: int, place: int | None, data: bytes, now: float) -> None:
         """Note what a drive sends that is not online."""
         if place is not None:
             wanted = self._responses[place]
             if len(data) < wanted.length:
-                self._heard.wrong(sentences.pdo_length(
+                self._offline_traffic.wrong(sentences.pdo_length(
                     wanted.number, len(data), wanted.length), now)
         if place is not None or identifier - self.configuration.station in (
                 sdo.RESPONSE_BASE, network.HEARTBEAT_BASE, network.EMERGENCY_BASE):
-            self._heard.came(now)
+            self._offline_traffic.came(now)
 
     @property
     def offline_advice(self) -> Sentence:
-        return self.defect or self._heard.instead_of(
+        return self.defect or self._offline_traffic.instead_of(
             self.report.advice, self._node, self._channel.now)
 
     def _receive_pdo(self, place: int, data: bytes, now: float, received_at: float) -> None:
@@ -417,7 +418,7 @@ class Cia402Session(Session):
         self._node.pdo_at = now
         if not exchange.cycling:
             answers.book.take_stale()
-            answers.slack.came(received_at)
+            answers.timing.came(received_at)
             return
         if self._synchronous and not answers.wanted:
             if place == count - 1 and not answers.expects('transmit PDO', now, received_at):
@@ -445,14 +446,14 @@ class Cia402Session(Session):
                 return
             self.be_online()
             self.duty.happened(Happened.ANSWERED)
-        if self._handover is not None:
-            self._handover.look(raws[0], now)
-        standing = self._standing
-        standing.status(raws[0], now)
-        if standing.watching:
-            standing.sampled(raws, now)
+        if self._handshake is not None:
+            self._handshake.look(raws[0], now)
+        standstill = self._standstill
+        standstill.status(raws[0], now)
+        if standstill.watching:
+            standstill.sampled(raws, now)
         self.interlock.status(raws[0], now)
-        self._looks.look(now)
+        self._polls.look(now)
         self.control_changed(now)
         self.interlock.measured(raws)
         self._homing.sampled(raws[0], raws, now)
@@ -468,10 +469,10 @@ class Cia402Session(Session):
             self._no_pdos_at_the_end(state, now)
         if self.stage is not Stage.RUNNING:
             return
-        self._answers.slack.heartbeat(self._node.silent_for)
+        self._answers.timing.heartbeat(self._node.silent_for)
         if change is NodeChange.RESTARTED:
             self.report.note(Noted(sentences.booted()))
-            self._answers.slack.forget()
+            self._answers.timing.forget()
             reason = sentences.device_restarted()
             self.services.fail_all(Failure(
                 FailureKind.NO_ANSWER, sentences.no_answer_because(reason)))
@@ -483,8 +484,8 @@ class Cia402Session(Session):
             self._no_answer_comes(now)
         elif state is not NmtState.OPERATIONAL and self.exchange.cycling and (
                 state is NmtState.STOPPED or not self.exchange.leaving
-                and now > self._bring_up.nmt_at + START_PAUSE + START_SPACING
-                and (self.online or not self._bring_up.starting(now))):
+                and now > self._node_set_up.nmt_at + START_PAUSE + START_SPACING
+                and (self.online or not self._node_set_up.starting(now))):
             self._close(sentences.node_state(state.text), now, START_PERIOD)
         else:
             self._again.heard(now, hurry=True)
@@ -512,14 +513,14 @@ class Cia402Session(Session):
     @property
     def mode_lacking(self) -> Sentence:
         """What the drive lacks to be driven although it reports enabled; '' if nothing."""
-        return self._looks.mode_lacking
+        return self._polls.mode_lacking
 
     @property
     def why(self) -> Sentence:
         """What else the drive says of why it is not enabled; '' if nothing."""
         emergency = self._node.emergency
         newest = NOTHING if emergency is None else sentences.emergency(emergency.text)
-        return together((self._homing.not_back, self.unready, self._looks.error, newest))
+        return together((self._homing.not_back, self.unready, self._polls.error, newest))
 
     def request_refusal(self, now: float) -> Failure | None:
         return Failure(FailureKind.OFFLINE, sentences.drive_offline_because(sentences.node_state(
@@ -529,14 +530,14 @@ class Cia402Session(Session):
         # also where the answer was lost: it may have been written
         if not self.serving and isinstance(request, WriteRequest) and any(
                 parameter.index in OPTIONS for parameter, _ in request.items):
-            self._channel.run(self._bring_up.learn_again(), lambda _: None, self._channel.now)
+            self._channel.run(self._node_set_up.learn_again(), lambda _: None, self._channel.now)
 
     # -- limits -----------------------------------------------------------------------------------
 
     def _limits_judged(self) -> None:
         now, limits = self._channel.now, self._limits
         if limits.otherwise:
-            self._bring_up.tell(limits.otherwise)
+            self._node_set_up.tell(limits.otherwise)
         if limits.without_effect and not self._see_to_limits(now):
             self.report.note(Noted(self.error, error=True))
         self._machine.rules_changed()
@@ -581,9 +582,9 @@ class Cia402Session(Session):
                                         + exchange.timer.stop_spacing))
 
     def commands_expired(self, now: float) -> None:
-        if self._handover is None:
+        if self._handshake is None:
             return
-        self._handover.disarmed()       # the next status may be a period away, and its word two
+        self._handshake.disarmed()       # the next status may be a period away, and its word two
         self._machine.rules_changed()
         timer = self.exchange.timer
         if self._machine.word != self.exchange.word:
@@ -638,15 +639,15 @@ class Cia402Session(Session):
             if reply.data is not None:
                 raw = int.from_bytes(reply.data[:2], 'little')
                 state = state_of(raw)
-                self._standing.status(raw, self._channel.now)
+                self._standstill.status(raw, self._channel.now)
             known = reply.abort is not None or reply.data is not None
             if known and state not in states.MOVING or self._channel.now >= self._stop_until:
                 return state
-            if self._standing.watching:
-                yield from self._standing.look(self._channel, sampled=False)
-            if self._standing.holds:
+            if self._standstill.watching:
+                yield from self._standstill.look(self._channel, sampled=False)
+            if self._standstill.holds:
                 yield Transfer(states.CONTROL_WORD, 0, bytes(2), timeout=self._stop.answer_time)
-            yield Transfer(pause=LOOK_PERIOD)
+            yield Transfer(pause=POLL_PERIOD)
 
     def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Transfer,
                                                                             TransferResult]:
@@ -688,7 +689,7 @@ class Cia402Session(Session):
         if self.owed or self._runs_on:      # then it is to stop by itself
             self.stop_left(why)
             return
-        self._channel.run(self._bring_up.watch.release(self._stop.answer_time),
+        self._channel.run(self._node_set_up.watch.release(self._stop.answer_time),
                           lambda _: self.stop_left(why), now, Priority.STOP)
 
     # -- SYNC -------------------------------------------------------------------------------------
@@ -707,7 +708,7 @@ class Cia402Session(Session):
     @property
     def sync_at(self) -> float:
         """From when on SYNC starts nothing that is in the buffers of the drive."""
-        return self._bring_up.sync_at
+        return self._node_set_up.sync_at
 
     # -- state ------------------------------------------------------------------------------------
 
@@ -733,11 +734,12 @@ class Cia402Session(Session):
 
     def facts(self) -> dict[str, str]:
         return {**self._node.facts(), 'stops_by': stops_by(
-            self._bring_up.options, self._bring_up.watch.text)}
+            self._node_set_up.options, self._node_set_up.watch.text)}
 
 
 def make_sessions(drives: Sequence[DriveConfiguration]) -> list[Session]:
     """Make the sessions of one bus, in the same order: one SYNC, and one heartbeat for all."""
-    beat, heartbeat = Beat(), common_heartbeat(drives)
-    return [Cia402Session(drive, beat, heartbeat if drive.options.bridge_heartbeat > 0 else None)
-            for drive in drives]
+    producer, heartbeat = SyncProducer(), common_heartbeat(drives)
+    return [Cia402Session(
+        drive, producer, heartbeat if drive.options.bridge_heartbeat > 0 else None)
+        for drive in drives]

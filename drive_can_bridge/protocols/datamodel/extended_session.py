@@ -2,8 +2,8 @@
 """
 The conversation with one DataModel drive that uses 29-bit identifiers.
 
-Its life (:meth:`ExtendedSession._life`) is one sequence, restarted whenever the drive is lost,
-the bus is back, or the process stood still:
+Its lifecycle (:meth:`ExtendedSession._script`) is one sequence, restarted whenever the drive is
+lost, the bus is back, or the process stalled:
 
 .. code-block:: text
 
@@ -52,12 +52,12 @@ from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_c
 from drive_can_bridge.protocols.datamodel.options import differences, effective
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
 from drive_can_bridge.protocols.datamodel.transactor import Procedure
-from drive_can_bridge.protocols.life import Life, Script
+from drive_can_bridge.protocols.lifecycle import Lifecycle, Script
 
 #: direction and station of an identifier
 FROM_WHOM = extended.DIR | extended.STATION_MASK
 #: s between two looks at the maps
-LOOK_PERIOD = 1.0
+POLL_PERIOD = 1.0
 #: longest pause between map rewrites
 REWRITE_PAUSE_MAX = 60.0
 #: so many looks at the maps in a row may go unanswered until that is told
@@ -99,18 +99,18 @@ class ExtendedSession(Session):
         self._answers: CycleAnswers = CycleAnswers(self, silence='no cyclic response')
         self._exchange = CyclicExchange(self._answers, self, slot=self._side.control_slot)
         self._answers.heeded = not self._verify      # otherwise the maps tell who has heard it
-        self._course = Life(self._channel)
-        self.look_after(self._exchange, self._course, *self._side.parts, channel=self._channel)
+        self._lifecycle = Lifecycle(self._channel)
+        self.look_after(self._exchange, self._lifecycle, *self._side.parts, channel=self._channel)
         self._differs = False       # what the last look at the maps found
         self._unread = NOTHING      # nobody knows whether the maps are still right
         self._told = NOTHING        # which difference
-        self._rewritten_at, self._pause = -math.inf, LOOK_PERIOD
+        self._rewritten_at, self._pause = -math.inf, POLL_PERIOD
 
     # -- life cycle -------------------------------------------------------------------------------
 
     def prepare_stop(self, now: float) -> bool:
         self._side.clear()
-        self._course.stop()
+        self._lifecycle.stop()
         owes = self.duty.happened(Happened.ENDS) is Do.STOP
         return self._exchange.cycling or (self.stage is not Stage.IDLE and owes)
 
@@ -136,16 +136,16 @@ class ExtendedSession(Session):
         self._differs = self._side.shows_up = False
         if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._side.begin_stop(now, setpoints=self._verify)
-        self._course.start(self._life(now), now)
+        self._lifecycle.start(self._script(now), now)
 
     def fall_silent(self) -> None:
         super().fall_silent()
         self._side.clear()
         self._differs = False
 
-    # -- the life of a drive ----------------------------------------------------------------------
+    # -- the script of a drive --------------------------------------------------------------------
 
-    def _life(self, now: float) -> Script:
+    def _script(self, now: float) -> Script:
         """Look at the maps, for ever; cycle while they agree."""
         exchange, self._unread = self._exchange, NOTHING
         agreed = differed = False   # what the look before found
@@ -154,7 +154,7 @@ class ExtendedSession(Session):
             maps: procedures.Maps | None = yield procedures.read_maps(
                 *self._map_bases, needed=self._wanted[0] if agreed else None)
             now = self._channel.now
-            look_at = now + LOOK_PERIOD
+            look_at = now + POLL_PERIOD
             found = '' if maps is None else '; '.join(differences(
                 maps.request, maps.response,
                 wanted_request=self._wanted[0], wanted_response=self._wanted[1]))
@@ -180,7 +180,7 @@ class ExtendedSession(Session):
                 agreed, differed, silent_looks = True, False, 0
                 self._differs, self._unread, self._told = False, NOTHING, NOTHING
                 if now - self._rewritten_at > REWRITE_PAUSE_MAX:
-                    self._pause = LOOK_PERIOD
+                    self._pause = POLL_PERIOD
                 if exchange.cycling and not exchange.leaving:
                     transactor = self._side.transactor
                     # a look that was under way when the stop left shows nothing of it
@@ -272,7 +272,7 @@ class ExtendedSession(Session):
         return self._rewritten_at + self._pause
 
     def _rewrite(self) -> Procedure[bool]:
-        """Rewrite the maps, and note it even if the life has ended meanwhile: cells wear."""
+        """Rewrite the maps, and note it even if the script has ended since: cells wear."""
         if self._rewritten_at > -math.inf:
             self._pause = min(2 * self._pause, REWRITE_PAUSE_MAX)
         request, response = self._wanted

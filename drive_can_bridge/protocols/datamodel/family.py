@@ -15,7 +15,7 @@ from drive_can_bridge.protocols.datamodel.extended import (
 from drive_can_bridge.protocols.datamodel.options import (
     ExtendedOptions, NUMBER_MAX, PROBED, REQUEST_MAP_BASE, RESPONSE_MAP_BASE, StandardOptions)
 from drive_can_bridge.protocols.family import (
-    Claim, Complaint, Family, out_of_range, ScanEntry, Talk)
+    Claim, Complaint, Family, FamilyParts, out_of_range, ScanEntry)
 
 #: the manual recommends not to cycle faster
 FASTEST_PERIOD = 0.005
@@ -142,12 +142,12 @@ class DataModelStandard(Family):
         """Return the time of a round of reads in which every setpoint changes."""
         return standard_round.shortest_period(drive, bitrate)
 
-    def talk(self) -> Talk:
+    def parts(self) -> FamilyParts:
         from drive_can_bridge.protocols.datamodel.standard_session import StandardSession
         from drive_can_bridge.protocols.datamodel.observer import StandardObserver
         from drive_can_bridge.protocols.datamodel.prober import standard_prober
         from drive_can_bridge.protocols.datamodel.scanner import StandardScanner
-        return Talk(StandardSession, StandardObserver, StandardScanner, standard_prober)
+        return FamilyParts(StandardSession, StandardObserver, StandardScanner, standard_prober)
 
     def _check_station(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         bases = _bases(drive)
@@ -208,12 +208,12 @@ class DataModelExtended(Family):
             return exchange
         return exchange + MAPPING_CHECK_BITS
 
-    def talk(self) -> Talk:
+    def parts(self) -> FamilyParts:
         from drive_can_bridge.protocols.datamodel.extended_session import ExtendedSession
         from drive_can_bridge.protocols.datamodel.observer import ExtendedObserver
         from drive_can_bridge.protocols.datamodel.prober import extended_prober
         from drive_can_bridge.protocols.datamodel.scanner import ExtendedScanner
-        return Talk(ExtendedSession, ExtendedObserver, ExtendedScanner, extended_prober)
+        return FamilyParts(ExtendedSession, ExtendedObserver, ExtendedScanner, extended_prober)
 
     def _check_slots(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         offset = drive.options.parameter_offset

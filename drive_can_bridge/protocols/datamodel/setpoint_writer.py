@@ -26,7 +26,7 @@ from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.datamodel.procedures import Numbers
 from drive_can_bridge.protocols.datamodel.transactor import (
     ParameterTransactor, ParameterWrite, Procedure, Reply, Step)
-from drive_can_bridge.protocols.life import Life, Script
+from drive_can_bridge.protocols.lifecycle import Lifecycle, Script
 from drive_can_bridge.protocols.polled_exchange import PolledExchange
 
 #: s between two looks at the status word, while a request is under way and otherwise
@@ -59,7 +59,7 @@ class ControlByNumber:
         self._status = status
         self._numbers = numbers
         self._output = output
-        self._watch = Life(channel)
+        self._watch = Lifecycle(channel)
 
     def begin(self, now: float) -> None:
         """Handle a drive that was found: it gets its word, and its status is looked at."""

@@ -11,7 +11,7 @@ from saying import says, status_word
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.control_machine import RESET_CYCLES
 from drive_can_bridge.core.events import DriveState, Noted
-from drive_can_bridge.protocols.cannord.control import hint
+from drive_can_bridge.protocols.cannord.control_words import hint
 
 ENABLE, DISABLE = ControlAction.ENABLE, ControlAction.DISABLE
 QUICK_STOP, RESET_FAULT = ControlAction.QUICK_STOP, ControlAction.RESET_FAULT

@@ -21,7 +21,7 @@ from drive_can_bridge.core.events import (
 )
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
-from drive_can_bridge.protocols.cannord.control import make_control
+from drive_can_bridge.protocols.cannord.control_words import make_control
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 
 ENABLE, DISABLE = ControlAction.ENABLE, ControlAction.DISABLE

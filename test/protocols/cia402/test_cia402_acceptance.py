@@ -16,7 +16,7 @@ from drive_can_bridge.core.messages import NOTHING
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.statistics import DriveStatistics
 from drive_can_bridge.protocols.canopen.sdo import describe
-from drive_can_bridge.protocols.cia402.handover import Handover
+from drive_can_bridge.protocols.cia402.setpoint_handshake import SetpointHandshake
 
 
 def test_an_axis_that_is_halted_stays_so_until_homing_starts() -> None:
@@ -122,18 +122,18 @@ def test_bit_8_does_not_fall_without_bit_4_when_an_arming_is_taken_back() -> Non
     target: Any = SimpleNamespace(parameter=SimpleNamespace(index=0x607A, subindex=None),
                                   armed=True, raw=5000)
     rules: Any = SimpleNamespace(mode_bits=0, halted=False)
-    handover = Handover(
+    handshake = SetpointHandshake(
         SimpleNamespace(items=[target]), rules, 2.0,  # type: ignore[arg-type]
         Reporter(DriveStatistics(), NOTHING))
-    handover.look(0x0027, 0.0)
-    handover.carried(0x003F, [5000])
+    handshake.look(0x0027, 0.0)
+    handshake.carried(0x003F, [5000])
     target.armed = False
-    handover.look(0x1027, 0.0)
+    handshake.look(0x1027, 0.0)
     assert (rules.mode_bits, rules.halted) == (0x100, True)
-    handover.look(0x0027, 0.0)
+    handshake.look(0x0027, 0.0)
     target.armed, target.raw = True, 6000
-    handover.look(0x0027, 0.0)
+    handshake.look(0x0027, 0.0)
     assert rules.mode_bits == 0x30
     target.armed = False
-    handover.look(0x0027, 0.0)
+    handshake.look(0x0027, 0.0)
     assert (rules.mode_bits, rules.halted) == (0x100, True)

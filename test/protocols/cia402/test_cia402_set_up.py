@@ -13,7 +13,7 @@ from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, MappingDiffered, Noted
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.protocols.canopen.sdo import describe
-from drive_can_bridge.protocols.cia402.bring_up import interpolation_time
+from drive_can_bridge.protocols.cia402.node_set_up import interpolation_time
 from drive_can_bridge.protocols.cia402.states import ServoState
 
 RPDO, TPDO = (0x1400, 1), (0x1800, 1)

@@ -63,7 +63,7 @@ class EventTimer(CycleTimer):
         self.no_later(max(now, self.began_at + CYCLE_SPACING_MIN))
 
 
-class Turn(CycleTimer):
+class SyncSlot(CycleTimer):
     """
     When one drive is due: with all others of its bus.
 
@@ -74,16 +74,16 @@ class Turn(CycleTimer):
     :ivar tell: takes what becomes of the SYNC behind them.
     """
 
-    __slots__ = ('_beat', 'begun_round', 'moved', 'period', 'session', 'tell')
+    __slots__ = ('_producer', 'begun_round', 'moved', 'period', 'session', 'tell')
 
-    def __init__(self, period: float, beat: 'Beat', session: InStep) -> None:
+    def __init__(self, period: float, producer: 'SyncProducer', session: InStep) -> None:
         super().__init__(period)
-        self._beat = beat
+        self._producer = producer
         self.period = period
         self.session = session
         self.begun_round = self.moved = False
         self.tell: Left | None = None
-        beat.turns.append(self)
+        producer.slots.append(self)
 
     @property
     def running(self) -> bool:
@@ -95,21 +95,21 @@ class Turn(CycleTimer):
         return self.begun_round or self.due < now + 0.5 * self.period
 
     def start(self, at: float) -> None:
-        self.moved = self._beat.pulling
-        due = self._beat.next_due(at, self, self.period)
+        self.moved = self._producer.pulling
+        due = self._producer.next_due(at, self, self.period)
         if self.running and due > at + self.stop_spacing:   # a stop
             if at > self.due:
-                self._beat.bring_forward(at)    # the others come along
+                self._producer.bring_forward(at)    # the others come along
             due = at
         super().start(due)
 
     def stop(self) -> None:
         super().start(math.inf)
-        self._beat.leave(self)
+        self._producer.leave(self)
 
     def no_later(self, at: float) -> None:
         if math.inf > self.due > at:
-            self._beat.bring_forward(at)
+            self._producer.bring_forward(at)
 
     def follow(self, at: float) -> None:
         """Be due then, because others are."""
@@ -123,35 +123,35 @@ class Turn(CycleTimer):
     def begun(self, now: float, pause: float | None = None) -> float:
         error = super().begun(now)
         if pause is not None and pause < self.period:     # those of a stop are closer
-            self._beat.bring_forward(now + pause)
-        self.begun_round, self.moved = True, self._beat.pulling
-        self._beat.agree()
+            self._producer.bring_forward(now + pause)
+        self.begun_round, self.moved = True, self._producer.pulling
+        self._producer.agree()
         return error
 
 
-class Beat:
+class SyncProducer:
     """
     The rounds of one bus.
 
-    :ivar turns: of all its drives, in their order.
+    :ivar slots: of all its drives, in their order.
     :ivar pulling: drives are served of whom another one was.
     :ivar opened: SYNC may be sent.
     :ivar by_rounds: rounds send it.
     """
 
     def __init__(self) -> None:
-        self.turns: list[Turn] = []
+        self.slots: list[SyncSlot] = []
         self.pulling = self.opened = self.by_rounds = False
         self._next = self._around_until = -math.inf     # the next SYNC; and NMT start
 
     @property
     def running(self) -> bool:
         """Some drive is in exchange, so that SYNC is sent."""
-        return any(turn.running for turn in self.turns)
+        return any(slot.running for slot in self.slots)
 
-    def next_due(self, at: float, turn: Turn, period: float) -> float:
+    def next_due(self, at: float, slot: SyncSlot, period: float) -> float:
         """Return when a drive that wants to begin then is due: with the others."""
-        due = min((other.due for other in self.turns if other is not turn), default=math.inf)
+        due = min((other.due for other in self.slots if other is not slot), default=math.inf)
         if due == math.inf and not self.by_rounds:
             due = self.due
         if math.inf in (due, at):
@@ -162,33 +162,33 @@ class Beat:
 
     def agree(self) -> None:
         """Make all that have begun this round due together, however late each of them was."""
-        begun = [turn for turn in self.turns if turn.begun_round and turn.running]
-        soonest = min(turn.due for turn in begun)
-        for turn in begun:
-            if turn.due > soonest:
-                CycleTimer.start(turn, soonest)
+        begun = [slot for slot in self.slots if slot.begun_round and slot.running]
+        soonest = min(slot.due for slot in begun)
+        for slot in begun:
+            if slot.due > soonest:
+                CycleTimer.start(slot, soonest)
 
     def bring_forward(self, at: float) -> None:
         """Schedule a whole round for then, unless it is due before."""
-        for turn in self.turns:
-            if turn.running and turn.due > at:
-                turn.follow(at)
+        for slot in self.slots:
+            if slot.running and slot.due > at:
+                slot.follow(at)
 
-    def begun(self, turn: Turn, now: float, tell: Left) -> None:
+    def begun(self, slot: SyncSlot, now: float, tell: Left) -> None:
         """
         Record that a drive was sent its RPDOs; SYNC follows if it was the last of this round.
 
         :param tell: takes what becomes of SYNC.
         """
-        turn.tell = tell
+        slot.tell = tell
         if self.pulling:
             return
-        round_of = [each for each in self.turns if each.takes_part(now)]
+        round_of = [each for each in self.slots if each.takes_part(now)]
         waiting = [each for each in round_of if not each.begun_round]
-        if waiting and round_of[-1] is not turn and not any(
+        if waiting and round_of[-1] is not slot and not any(
                 each.moved or each.due > now for each in waiting):
             return      # they are served right behind this one
-        outbox, self.pulling = turn.session.outbox, True
+        outbox, self.pulling = slot.session.outbox, True
         try:
             for each in waiting:
                 if each.due > now:
@@ -199,19 +199,19 @@ class Beat:
             self.pulling = False
         self._send_sync(outbox)
 
-    def leave(self, turn: Turn) -> None:
+    def leave(self, slot: SyncSlot) -> None:
         """Record that a drive is not in exchange any more: others may have waited for it."""
-        turn.begun_round, turn.tell = False, None
-        running = [each for each in self.turns if each.running]
+        slot.begun_round, slot.tell = False, None
+        running = [each for each in self.slots if each.running]
         self.by_rounds = self.by_rounds and bool(running)
         if running and not self.pulling and all(each.begun_round for each in running):
-            self._send_sync(turn.session.outbox)
+            self._send_sync(slot.session.outbox)
 
     def _send_sync(self, outbox: Outbox) -> None:
-        told = [each.tell for each in self.turns if each.begun_round and each.tell is not None]
-        for each in self.turns:
+        told = [each.tell for each in self.slots if each.begun_round and each.tell is not None]
+        for each in self.slots:
             each.begun_round, each.tell = False, None
-        self.by_rounds, self._next = True, min(each.due for each in self.turns)
+        self.by_rounds, self._next = True, min(each.due for each in self.slots)
 
         def left(sent: bool, now: float) -> None:
             for tell in told:
@@ -224,14 +224,14 @@ class Beat:
     @property
     def due(self) -> float:
         """When SYNC is to be sent, or to begin, that no round sends; infinity: never."""
-        sessions = [turn.session for turn in self.turns if turn.session.needs_sync]
+        sessions = [slot.session for slot in self.slots if slot.session.needs_sync]
         if not sessions:
             return math.inf
         if not self.opened:
             return max(session.sync_at for session in sessions)
         until = max(HEARD_TIME + max(session.heard_at for session in sessions), self._around_until)
-        soon = self._next + 0.5 * self.turns[0].period
-        if self._next > until or min(turn.due for turn in self.turns) < soon:
+        soon = self._next + 0.5 * self.slots[0].period
+        if self._next > until or min(slot.due for slot in self.slots) < soon:
             return math.inf
         return self._next
 
@@ -243,7 +243,7 @@ class Beat:
             self.opened, self._next = True, now
             if now < self.due:
                 return
-        period = self.turns[0].period
+        period = self.slots[0].period
         self._next += period * max(1, math.ceil((now - self._next) / period - 0.5))
         outbox.put(network.encode_sync())
 
@@ -262,27 +262,27 @@ class Beat:
 
     def ended(self) -> None:
         """Record that a session sends nothing more."""
-        if all(turn.session.stage is Stage.IDLE for turn in self.turns):
+        if all(slot.session.stage is Stage.IDLE for slot in self.slots):
             self.shut()
 
 
 class FreeSync:
     """The part of a session that sends SYNC while no round does: any of the bus."""
 
-    def __init__(self, session: InStep, beat: Beat) -> None:
-        self._session, self._beat = session, beat
+    def __init__(self, session: InStep, producer: SyncProducer) -> None:
+        self._session, self._producer = session, producer
 
     @property
     def due(self) -> float:
         """When SYNC is due."""
-        if self._beat.by_rounds or self._session.stage is Stage.IDLE:
+        if self._producer.by_rounds or self._session.stage is Stage.IDLE:
             return math.inf
-        return self._beat.due
+        return self._producer.due
 
     def handle_timer(self, now: float) -> None:
         """Send it, if it is due."""
-        self._beat.send(self._session.outbox, now)
+        self._producer.send(self._session.outbox, now)
 
     def stop(self) -> None:
         """Send none any more on account of this drive."""
-        self._beat.ended()
+        self._producer.ended()

@@ -20,11 +20,11 @@ from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.protocols.cia402 import states
-from drive_can_bridge.protocols.cia402.control import DriveRules
+from drive_can_bridge.protocols.cia402.state_machine import DriveRules
 from drive_can_bridge.protocols.cia402.states import MODES, ServoState, state_of
 
 
-class Handover:
+class SetpointHandshake:
     """
     The targets of one drive.
 

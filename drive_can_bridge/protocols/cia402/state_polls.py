@@ -2,7 +2,7 @@
 """
 What the status word does not say, read by SDO where something depends on it.
 
-Whether the axis stands, where samples do not say it (:mod:`.standing`, 606Ch); which mode an
+Whether the axis stands, where samples do not say it (:mod:`.standstill`, 606Ch); which mode an
 enabled drive is in (6061h), until it shows that of the file; why a drive does not become enabled
 (603Fh), when half of its time for that is over.
 """
@@ -14,21 +14,21 @@ from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import states
-from drive_can_bridge.protocols.cia402.bring_up import BringUp, LOOK_PERIOD
-from drive_can_bridge.protocols.cia402.control import DriveRules
 from drive_can_bridge.protocols.cia402.homing import Homing
+from drive_can_bridge.protocols.cia402.node_set_up import NodeSetUp, POLL_PERIOD
+from drive_can_bridge.protocols.cia402.state_machine import DriveRules
 from drive_can_bridge.protocols.cia402.states import MODES, ServoState
 from drive_can_bridge.protocols.cia402.transactor import Procedure, SdoChannel, Transfer
 
 
-class StateLooks:
+class StatePolls:
     """The looks at one drive, one at a time."""
 
     def __init__(self, session: Session, control: ControlMachine, rules: DriveRules,
-                 channel: SdoChannel, bring_up: BringUp, homing: Homing) -> None:
+                 channel: SdoChannel, node_set_up: NodeSetUp, homing: Homing) -> None:
         self._session, self._control, self._rules = session, control, rules
-        self._channel, self._bring_up, self._homing = channel, bring_up, homing
-        self._standing = rules.standing
+        self._channel, self._node_set_up, self._homing = channel, node_set_up, homing
+        self._standstill = rules.standstill
         self._mode = MODES[session.configuration.options.mode].number
         self.forget()
 
@@ -51,7 +51,7 @@ class StateLooks:
             self._error_code = None
         if self._looking:
             return
-        if self._standing.watching and not self._standing.holds:
+        if self._standstill.watching and not self._standstill.holds:
             self._begin(self._look_at_axis(), now)
         elif self._session.stage is not Stage.RUNNING:
             return      # at the end nothing else is asked
@@ -71,7 +71,7 @@ class StateLooks:
         while self._rules.state is ServoState.OPERATION_ENABLED:
             reply = yield Transfer(states.MODE_SHOWN)
             if reply.abort in sdo.ABSENT:
-                self._bring_up.tell(sentences.mode_not_shown())
+                self._node_set_up.tell(sentences.mode_not_shown())
                 self._mode_shown = self._mode       # nothing says otherwise
             elif reply.data:
                 self._mode_shown = int.from_bytes(reply.data[:1], 'little', signed=True)
@@ -80,13 +80,13 @@ class StateLooks:
                     self._control.status_received(self._rules.status, self._channel.now)
                     self._session.control_changed(self._channel.now)
                 return
-            yield Transfer(pause=LOOK_PERIOD)
+            yield Transfer(pause=POLL_PERIOD)
 
     def _look_at_axis(self) -> Procedure[None]:
         """Read what samples do not say as long as it is to be known whether the axis stands."""
-        while self._standing.watching and not self._standing.holds:
-            yield from self._standing.look(self._channel)
-            yield Transfer(pause=LOOK_PERIOD)
+        while self._standstill.watching and not self._standstill.holds:
+            yield from self._standstill.look(self._channel)
+            yield Transfer(pause=POLL_PERIOD)
 
     def _look_at_error(self) -> Procedure[None]:
         """Read 603Fh: why the drive is not enabled."""

@@ -1,14 +1,14 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The life of a drive as a script: what is done with it, one thing after the other.
+The lifecycle of a drive as a script: what is done with it, one thing after the other.
 
 A family writes it down as one generator. It yields a procedure of the acyclic channel, and is sent
 what that returned; or the time until which it waits, and is sent the time when it goes on. What
 has to be fast (cycles, answers, the control word) goes on beside it.
 
-Found, lost, bus back, a stall: whatever makes the conversation restart *starts* a life, which
-ends the one before where it stands. So a position in the sequence is a line of the generator, and
-never a flag.
+Found, lost, bus back, a stall: whatever makes the conversation restart *starts* a script,
+which ends the one before where it stands. So a position in the sequence is a line of the
+generator, and never a flag.
 """
 
 from collections.abc import Generator
@@ -22,7 +22,7 @@ from drive_can_bridge.protocols.channel import Channel
 Script = Generator[Any, Any, None]
 
 
-class Life:
+class Lifecycle:
     """
     Runs one script: a part of the session.
 
@@ -64,7 +64,7 @@ class Life:
             wanted = script.send(found)
         except StopIteration:
             return
-        if script is not self._script:      # what it did has begun or ended a life
+        if script is not self._script:      # what it did has begun or ended one
             return
         if isinstance(wanted, (int, float)):
             self.due = wanted

@@ -25,15 +25,15 @@ from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import START_PAUSE, WatchedNode
 from drive_can_bridge.protocols.cia402 import pdo, states, stop_options
-from drive_can_bridge.protocols.cia402.beat import Beat
-from drive_can_bridge.protocols.cia402.control import DISABLE_WORDS, DriveRules
 from drive_can_bridge.protocols.cia402.limits import LimitCheck
 from drive_can_bridge.protocols.cia402.mapped import read_mapped
 from drive_can_bridge.protocols.cia402.objects import (
     at_object, differs, ObjectAccess, SetUpEnd, SetUpOutcome, SetUpState, silent)
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.pdo_set_up import PdoSetUp
+from drive_can_bridge.protocols.cia402.state_machine import DISABLE_WORDS, DriveRules
 from drive_can_bridge.protocols.cia402.states import MODES, ServoState
+from drive_can_bridge.protocols.cia402.sync import SyncProducer
 from drive_can_bridge.protocols.cia402.transactor import (
     Procedure, SdoChannel, Transfer, TransferResult)
 from drive_can_bridge.protocols.cia402.watch import BridgeWatch
@@ -43,7 +43,7 @@ PRODUCER = 0x1017
 #: 1005h: the device itself produces SYNC
 _PRODUCES_SYNC = 1 << 30
 #: s between two looks at what is awaited
-LOOK_PERIOD = 0.02
+POLL_PERIOD = 0.02
 #: s that a drive has to acknowledge its stop until SYNC begins, and that a silent one is silent
 STOP_TIME, SILENCE_TIME = 0.5, 1.0
 #: s that the first heartbeat behind NMT start is waited for
@@ -53,7 +53,7 @@ _LOOKS = 5
 _POWERS = (-3, -4, -5, -6, -2, -1, 0)
 
 
-class BringUp:
+class NodeSetUp:
     """
     The sequence for one drive.
 
@@ -61,17 +61,17 @@ class BringUp:
     :param limits: learn what they are before anything is sent.
     :ivar watch: who watches the bridge.
     :ivar options: what 605Ah, 605Bh, 605Ch say, by index; without those that the drive lacks.
-    :param beat: has SYNC; None: the drive does not hear it.
+    :param producer: of SYNC; None: the drive does not hear it.
     :ivar nmt_at: when it was sent NMT last.
     :ivar started_at: when it was sent NMT start last.
     :ivar moving: in which state it was found, where nobody has seen it leave that since.
     """
 
     def __init__(self, session: Session, node: WatchedNode, rules: DriveRules, channel: SdoChannel,
-                 limits: LimitCheck, beat: Beat | None) -> None:
+                 limits: LimitCheck, producer: SyncProducer | None) -> None:
         drive = session.configuration
         self._session, self._node, self._rules = session, node, rules
-        self._channel, self._limits, self._beat = channel, limits, beat
+        self._channel, self._limits, self._producer = channel, limits, producer
         self._drive, self._options = drive, drive.options
         self._mode = MODES[drive.options.mode]
         objects = self._objects = ObjectAccess(drive.parameter_retries + 1)
@@ -163,7 +163,7 @@ class BringUp:
                     at_object(states.STATUS_WORD), sdo.describe(reply.abort or 0)))
             raw = int.from_bytes(reply.data[:2], 'little')
             state = states.state_of(raw)
-            self._rules.standing.status(raw, self._channel.now)
+            self._rules.standstill.status(raw, self._channel.now)
             if state not in states.MOVING:
                 break
             self._stopped_at = min(self._stopped_at, self._channel.now)
@@ -185,10 +185,10 @@ class BringUp:
                 word = wanted
                 refusal = yield from self._put(states.CONTROL_WORD, 0, word, 2)
             looks += 1
-            yield Transfer(pause=LOOK_PERIOD)
+            yield Transfer(pause=POLL_PERIOD)
             reply = yield from self._transfer(Transfer(states.STATUS_WORD))
         self._found = NOTHING
-        if state in states.ONE_WORD_FROM_ENABLED and self._beat is not None:
+        if state in states.ONE_WORD_FROM_ENABLED and self._producer is not None:
             # a SYNC may put into effect a 000Fh that the drive still has in its buffers
             yield from self._put(states.CONTROL_WORD, 0, states.DISABLE_VOLTAGE, 2)
         self.moving, self._disabled = None, True
@@ -198,18 +198,19 @@ class BringUp:
 
     def _tell_blindly(self, attempts: int | None = None) -> Procedure[None]:
         """Stop a drive whose state nobody knows, before SYNC begins."""
-        if self._beat is not None and not self._beat.opened and self._stopped_at == math.inf:
+        producer = self._producer
+        if producer is not None and not producer.opened and self._stopped_at == math.inf:
             self._stopped_at = self._channel.now
             word = DISABLE_WORDS[self._options.disable_word].to_bytes(2, 'little')
             yield Transfer(states.CONTROL_WORD, 0, word, attempts=attempts)
 
     def _brakes(self) -> Procedure[bool]:
         """Return whether a quick stop takes its course."""
-        standing = self._rules.standing
-        standing.quick_stop_option = yield from self._read(
+        standstill = self._rules.standstill
+        standstill.quick_stop_option = yield from self._read(
             states.QUICK_STOP_OPTION, 0, 2, signed=True)
-        yield from standing.look(self._channel, sampled=False)
-        return not standing.holds
+        yield from standstill.look(self._channel, sampled=False)
+        return not standstill.holds
 
     def _learn(self) -> Procedure[None]:
         """Read what the drive does at a stop."""
@@ -220,7 +221,7 @@ class BringUp:
             else:
                 self.options[index] = value
                 self.tell(stop_options.unknown(index, value))
-            self._rules.standing.quick_stop_option = self.options.get(states.QUICK_STOP_OPTION)
+            self._rules.standstill.quick_stop_option = self.options.get(states.QUICK_STOP_OPTION)
 
     def learn_again(self) -> Procedure[None]:
         """Read it once more: users have written it."""
@@ -263,12 +264,12 @@ class BringUp:
         if self._node.ceased:
             self._session.report.advise(sentences.no_heartbeat(self._node.heartbeat_timeout))
             while self._node.ceased:
-                yield Transfer(pause=LOOK_PERIOD)
+                yield Transfer(pause=POLL_PERIOD)
 
     def _start(self) -> Procedure[None]:
         """Start the node, or wait until somebody else does."""
-        if self._beat is not None:
-            yield from self._sync_begins(self._beat)
+        if self._producer is not None:
+            yield from self._sync_begins(self._producer)
         if self._options.nmt_start:
             self._nmt(NmtCommand.START)
             self.started_at = self._channel.now
@@ -277,14 +278,14 @@ class BringUp:
         elif self._waits_for_start and self._node.state is not None:
             self._session.report.advise(sentences.node_state(self._node.state.text))
             while self._waits_for_start:
-                yield Transfer(pause=LOOK_PERIOD)
+                yield Transfer(pause=POLL_PERIOD)
 
-    def _sync_begins(self, beat: Beat) -> Procedure[None]:
+    def _sync_begins(self, producer: SyncProducer) -> Procedure[None]:
         """Wait until there is SYNC: a drive that watches it needs it when it is started."""
-        while not beat.opened:
+        while not producer.opened:
             self._session.report.advise(sentences.sync_not_begun())
-            yield Transfer(pause=LOOK_PERIOD)
-        pause = beat.before_start(self._channel.now) if self._options.nmt_start else 0.0
+            yield Transfer(pause=POLL_PERIOD)
+        pause = producer.before_start(self._channel.now) if self._options.nmt_start else 0.0
         if pause:
             yield Transfer(pause=pause)
 
@@ -303,7 +304,7 @@ class BringUp:
             if now >= until:
                 raise SetUpEnd(SetUpOutcome(SetUpState.SILENT, sentences.node_state(
                     (said or NmtState.PRE_OPERATIONAL).text)))
-            yield Transfer(pause=LOOK_PERIOD)
+            yield Transfer(pause=POLL_PERIOD)
 
     def starting(self, now: float) -> bool:
         """Return whether the node may still be on its way to operational."""
@@ -339,7 +340,7 @@ class BringUp:
             if setpoints.known:
                 return
             self._session.report.advise(setpoints.untold_text)
-            yield Transfer(pause=5 * LOOK_PERIOD)
+            yield Transfer(pause=5 * POLL_PERIOD)
 
     def _choose_mode(self) -> Procedure[None]:
         number, name = self._mode.number, self._options.mode
@@ -376,7 +377,7 @@ class BringUp:
             for _ in range(_LOOKS):     # whether it may be written, a heartbeat says
                 if self._node.state is None:
                     yield Transfer(pause=self._options.heartbeat_producer / 2)
-        if self._beat is not None:
+        if self._producer is not None:
             yield from self._sync()
         yield from self._pdos.set_up()
 

@@ -14,9 +14,9 @@ object    says that it moves
 bit 10    where neither exists: low in that state, then set in a row, says that it stands
 ========= =====================================================================================
 
-In *quick stop active* 605Ah decides what else counts (:attr:`Standing.holds`). Real drives stay in
-that state whatever 605Ah says, freeze 606Ch at its last value, never set bit 10, or have none of
-all these; encoders dither.
+In *quick stop active* 605Ah decides what else counts (:attr:`Standstill.holds`). Real drives stay
+in that state whatever 605Ah says, freeze 606Ch at its last value, never set bit 10, or have none
+of all these; encoders dither.
 """
 
 from collections.abc import Sequence
@@ -105,7 +105,7 @@ class Band:
         return self.seen_at - self.since >= duration and not self.creeps
 
 
-class Standing:
+class Standstill:
     """
     What is known of the motion of one axis, and of its quick stop.
 

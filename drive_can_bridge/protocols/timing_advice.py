@@ -27,7 +27,7 @@ def enough(seconds: float) -> float:
     return float(wanted.quantize(Decimal(1).scaleb(wanted.adjusted() - 1), ROUND_CEILING))
 
 
-class Slack:
+class TimingAdvice:
     """
     What one drive was late with.
 

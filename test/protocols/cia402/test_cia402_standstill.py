@@ -9,7 +9,7 @@ from servos import CanopenNodeServo, LelyServo, TurningServo
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Noted
-from drive_can_bridge.protocols.cia402.standing import Band, Standing
+from drive_can_bridge.protocols.cia402.standstill import Band, Standstill
 from drive_can_bridge.protocols.cia402.states import ServoState
 
 ENABLE, DISABLE, QUICK_STOP = (
@@ -290,9 +290,9 @@ class TestBand:
                 'target_position', None, index=0x607A, subindex=0, type=TARGET.type,
                 neutral_from='position', arming_tolerance=tolerance)
             axis = Axis('csp', request=(target,), table=(target, POSITION))
-            standing = Standing(axis.talk.session.configuration)
+            standstill = Standstill(axis.talk.session.configuration)
             for at, place in ((0.0, 0), (0.1, width), (0.2, 0), (0.6, width)):
-                standing.band.take(place, at)
-            assert standing.band.stays(0.5)
-            standing.band.take(width + 1, 0.7)
-            assert not standing.band.stays(0.5)
+                standstill.band.take(place, at)
+            assert standstill.band.stays(0.5)
+            standstill.band.take(width + 1, 0.7)
+            assert not standstill.band.stays(0.5)

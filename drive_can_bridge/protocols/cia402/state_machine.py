@@ -33,7 +33,7 @@ from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.core.status_bits import STATUS_NAME
 from drive_can_bridge.protocols.cia402 import states
-from drive_can_bridge.protocols.cia402.standing import Standing
+from drive_can_bridge.protocols.cia402.standstill import Standstill
 from drive_can_bridge.protocols.cia402.states import PATTERNS, ServoState
 
 DISABLE_WORDS = {'disable_operation': states.SWITCH_ON, 'shutdown': states.SHUTDOWN,
@@ -90,12 +90,12 @@ class DriveRules(TableRules):
     :ivar halted: the drive was told to halt: its position is its own.
     """
 
-    def __init__(self, table: ControlTable, options: Any, known: Known, standing: Standing,
+    def __init__(self, table: ControlTable, options: Any, known: Known, standstill: Standstill,
                  ) -> None:
         super().__init__(table)
         self.state: ServoState | None = None
         self.status = 0
-        self.standing = standing
+        self.standstill = standstill
         self.mode_bits = states.INTERPOLATE if options.mode == 'ip' else 0
         self.homing_bits: int | None = None
         self.halted = False
@@ -119,8 +119,8 @@ class DriveRules(TableRules):
         if self._quick_stop_unseen:
             return states.QUICK_STOP
         if self.state is ServoState.QUICK_STOP_ACTIVE:
-            on_trust = not self.standing.holds
-            if on_trust and (asked is None or not self.standing.untold):
+            on_trust = not self.standstill.holds
+            if on_trust and (asked is None or not self.standstill.untold):
                 return states.QUICK_STOP
             self._taken_on_trust = on_trust
             return states.DISABLE_VOLTAGE
@@ -177,7 +177,7 @@ class DriveRules(TableRules):
             or self.state is ServoState.QUICK_STOP_ACTIVE)
         self.state, self.status, self._answers = None, 0, 0
         self.halted = self._taken_on_trust = False
-        self.standing.forget()
+        self.standstill.forget()
 
     def known_disabled(self) -> None:
         """Record that the drive was asked by SDO, and is not enabled."""
@@ -186,11 +186,11 @@ class DriveRules(TableRules):
 
     @property
     def holds(self) -> Sentence:
-        if self.standing.holds:
+        if self.standstill.holds:
             return sentences.quick_stop_holds(ServoState.QUICK_STOP_ACTIVE.value)
         return together((
             sentences.quick_stop_holds(ServoState.QUICK_STOP_ACTIVE.value),
-            sentences.nothing_says_standing())) if self.standing.untold else NOTHING
+            sentences.nothing_says_standing())) if self.standstill.untold else NOTHING
 
     def proviso(self) -> Sentence:
         on_trust, self._taken_on_trust = self._taken_on_trust, False

@@ -18,7 +18,7 @@ from drive_can_bridge.protocols.canopen.node import WatchedNode
 HEARD_TIME = 3.0
 
 
-class Heard:
+class OfflineTraffic:
     """
     Frames of one node while it is not online.
 

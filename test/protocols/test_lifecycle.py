@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from drive_can_bridge.protocols.channel import Channel
-from drive_can_bridge.protocols.life import Life, Script
+from drive_can_bridge.protocols.lifecycle import Lifecycle, Script
 
 
 class Procedures(Channel[Any, Any]):
@@ -33,13 +33,13 @@ def procedure(step: str) -> Generator[str, Any, Any]:
     return (yield step)
 
 
-def life() -> tuple[Procedures, Life]:
+def lifecycle() -> tuple[Procedures, Lifecycle]:
     channel = Procedures()
-    return channel, Life(channel)
+    return channel, Lifecycle(channel)
 
 
 def test_procedures_and_times_come_back() -> None:
-    channel, runner = life()
+    channel, runner = lifecycle()
     seen = []
 
     def script() -> Script:
@@ -62,7 +62,7 @@ def test_procedures_and_times_come_back() -> None:
 
 
 def test_another_life_ends_the_one_before() -> None:
-    channel, runner = life()
+    channel, runner = lifecycle()
     told = []
 
     def script(name: str) -> Script:
@@ -80,7 +80,7 @@ def test_another_life_ends_the_one_before() -> None:
 
 
 def test_life_that_waits_is_ended_too() -> None:
-    channel, runner = life()
+    channel, runner = lifecycle()
 
     def waiting() -> Script:
         yield 11.0
@@ -94,7 +94,7 @@ def test_life_that_waits_is_ended_too() -> None:
 
 
 def test_script_may_begin_another_life() -> None:
-    channel, runner = life()
+    channel, runner = lifecycle()
 
     def second() -> Script:
         yield 20.0
@@ -109,7 +109,7 @@ def test_script_may_begin_another_life() -> None:
 
 
 def test_channel_that_was_cleared_is_not_waited_for() -> None:
-    channel, runner = life()
+    channel, runner = lifecycle()
 
     def script(name: str) -> Script:
         yield procedure(name)
