@@ -22,7 +22,7 @@ from pathlib import Path
 import re
 import struct
 import sys
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Union
 
 from drive_can_bridge.core import complaints, frame_sentences, sentences
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
@@ -32,9 +32,9 @@ from drive_can_bridge.core.events import ForeignMasterSeen, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX, worst_bits
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.requests import Failure, FailureKind, Outcomes, Written
+from drive_can_bridge.core.requests import Outcome, Written
 from drive_can_bridge.core.session import Session, Stage
-from drive_can_bridge.protocols.access import Found, Item, OneByOne, ParameterAccess
+from drive_can_bridge.protocols.access import Found, OneByOne, ParameterAccess
 from drive_can_bridge.protocols.answers import CycleAnswers
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
@@ -46,13 +46,14 @@ from drive_can_bridge.protocols.pairing import CyclicWatch, PendingRequests, Req
 from drive_can_bridge.protocols.scanner import (
     Certainty, Conversation, Finding, Prober, Question, Scanner, Sighting)
 from drive_can_bridge.protocols.telegrams import Direction
-from drive_can_bridge.protocols.transactor import Transactor
+from drive_can_bridge.protocols.transactor import Answered, Refused, Silence, SILENT, Transactor
 from drive_can_bridge.simulation.drive import SimulatedDrive
 from drive_can_bridge.simulation.simulation import SIMULATED_DRIVES
 
 CYCLE, SAMPLE, TASK, REPLY = BASES = 0x10, 0x20, 0x30, 0x40
 READ, WRITE, REFUSED = 1, 2, 3
 STATION_MAX = 15
+Reply = Union[Answered[int], Refused, Silence]
 
 # -- wire -----------------------------------------------------------------------------------------
 
@@ -87,10 +88,10 @@ def decode_words(data: bytes) -> list[int]:
 # -- session --------------------------------------------------------------------------------------
 
 
-class ToyTransactor(Transactor[Task, Any]):
+class ToyTransactor(Transactor[Task, Reply]):
     """One task at a time, answered by its number."""
 
-    silent = None
+    silent = SILENT
 
     def __init__(self, session: Session) -> None:
         super().__init__(session.retry)
@@ -100,42 +101,32 @@ class ToyTransactor(Transactor[Task, Any]):
         self.expect(step, now + self.retry.timeout)
         self._session.outbox.put(encode_task(TASK, self._session.configuration.station, step))
 
-    def receive(self, answer: Task, now: float) -> Any:
+    def receive(self, answer: Task, now: float) -> Reply | bool:
         if self.step is None or answer.number != self.step.number:
             return False
         self.finish()
-        return answer
+        return Answered(answer.value) if answer.function != REFUSED else Refused(
+            REFUSED, 'not there')
 
     def attempts(self, step: Task) -> int:
         return self.retry.attempts
-
-    def unanswered(self, step: Task, reply: Any) -> bool:
-        return reply is None
 
     def key(self, step: Task) -> int:
         return step.number
 
 
-class ToyAccess(ParameterAccess[Parameter, Task, Any]):
+class ToyAccess(ParameterAccess[Parameter, Task, Reply]):
     """One parameter a task."""
 
-    def read(self, span: Parameter) -> Generator[Task, Any, Found]:
+    not_atomic = sentences.not_in_one_frame('a toy frame carries one parameter')
+
+    def read(self, span: Parameter) -> Generator[Task, Reply, Found]:
         reply = yield Task(READ, span.number or 0)
-        return self._failure(reply) or (reply.value,)
+        return (reply.content,) if isinstance(reply, Answered) else self.failed(reply)
 
-    def write(self, items: Sequence[Item]) -> Generator[Task, Any, Outcomes]:
-        (parameter, raw), = items
+    def write_one(self, parameter: Parameter, raw: int) -> Generator[Task, Reply, Outcome]:
         reply = yield Task(WRITE, parameter.number or 0, parameter.word_from_raw(raw))
-        return (self._failure(reply) or Written(),)
-
-    def misfit(self, items: Sequence[Item]) -> Sentence:
-        return sentences.not_in_one_frame('a toy frame carries one parameter')
-
-    def _failure(self, reply: Task | None) -> Failure | None:
-        if reply is None:
-            return self.retry.unanswered()
-        return None if reply.function != REFUSED else Failure(
-            FailureKind.REFUSED, sentences.refused_by_drive(REFUSED, 'not there'))
+        return Written() if isinstance(reply, Answered) else self.failed(reply)
 
 
 class ToySession(Session):

@@ -20,11 +20,11 @@ from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.requests import (
-    Failure, FailureKind, Outcome, Outcomes, ReadRequest, ReadValue, Request, RetryPolicy,
-    WriteRequest)
+    Failure, FailureKind, NOT_SENT, Outcome, Outcomes, ReadRequest, ReadValue, Request,
+    RetryPolicy, WriteRequest)
 from drive_can_bridge.core.text import value_text
 from drive_can_bridge.protocols.channel import Channel, Priority
-from drive_can_bridge.protocols.transactor import ReplyT, StepT
+from drive_can_bridge.protocols.transactor import Refused, ReplyT, Silence, StepT
 
 #: what one read asks for, and what one parameter takes
 SpanT = TypeVar('SpanT', bound=Hashable)
@@ -116,12 +116,15 @@ class ParameterAccess(ABC, Generic[SpanT, StepT, ReplyT]):
     """
     The parameters of one drive: serves the requests of users in their turn on its channel.
 
-    A family says how one frame is read (:meth:`read`), how one is written (:meth:`write`), and
-    what fits into it (:meth:`misfit`).
+    A family says how one frame is read (:meth:`read`), how one is written (:meth:`write_one`; or
+    :meth:`write`, and what fits into it, :meth:`misfit`).
 
     :param retry: what is said when nobody answers.
     :param placement: where the parameters stand.
+    :cvar not_atomic: why several do not fit one frame, where it carries one.
     """
+
+    not_atomic: Sentence
 
     def __init__(self, channel: Channel[StepT, ReplyT], retry: RetryPolicy,
                  placement: ParameterPlacement[SpanT]) -> None:
@@ -156,23 +159,35 @@ class ParameterAccess(ABC, Generic[SpanT, StepT, ReplyT]):
     def read(self, span: SpanT) -> Generator[StepT, ReplyT, Found]:
         """Read what one frame can bring."""
 
-    @abstractmethod
     def write(self, items: Sequence[Item]) -> Generator[StepT, ReplyT, Outcomes]:
         """Write what fits one frame, and see that the drive has it."""
+        (parameter, raw), = items
+        return ((yield from self.write_one(parameter, raw)),)
+
+    def write_one(self, parameter: Parameter, raw: int) -> Generator[StepT, ReplyT, Outcome]:
+        """Write likewise, where a frame carries one parameter."""
+        raise NotImplementedError
 
     def write_blind(self, items: Sequence[Item]) -> Generator[StepT, ReplyT, Outcomes]:
         """Write likewise, without waiting for anything that the drive says first."""
         return self.write(items)
 
-    @abstractmethod
     def misfit(self, items: Sequence[Item]) -> Sentence:
         """Return why several parameters do not fit one frame; '' if they do."""
+        return self.not_atomic
 
     def aside(self, parameter: Parameter, *, write: bool) -> Outcome | None:
         """Return the outcome for a parameter that no frame can reach; None: one can."""
         return None
 
     # -- what is the same for all -----------------------------------------------------------------
+
+    def failed(self, reply: Refused | Silence, attempts: int | None = None,
+               timeout: float | None = None) -> Failure:
+        """Return what became of a request; ``attempts`` in ``timeout`` s: as configured."""
+        if isinstance(reply, Refused):
+            return reply.failure
+        return NOT_SENT if reply.refused else self.retry.unanswered(attempts, timeout)
 
     def _read_all(self, parameters: Sequence[Parameter]) -> Generator[StepT, ReplyT, Outcomes]:
         """Read parameters; what shares a frame with one that fails is asked for alone."""

@@ -11,7 +11,7 @@ the first exchange that is complete. Until then, and that may be for ever if it 
 only, any sign of life has it told again (:class:`StopAgain`): at once, and then with pauses.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from functools import partial
 import math
 from typing import Any, Generic, NamedTuple, Union
@@ -24,7 +24,7 @@ from drive_can_bridge.core.process_image import control_word
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import CONTROL_WORD, Happened
 from drive_can_bridge.protocols.channel import Channel, Priority
-from drive_can_bridge.protocols.transactor import ReplyT, StepT
+from drive_can_bridge.protocols.transactor import Refused, ReplyT, Silence, StepT
 
 #: how often a drive is told to stand still by writes, at most, until it has confirmed that
 STOP_ATTEMPTS = 3
@@ -41,6 +41,32 @@ class StopWrite(NamedTuple):
     parameter: Parameter
     raw: int
     is_word: bool = False
+
+    @property
+    def name(self) -> str:
+        """What it is called in messages."""
+        return f'{self.parameter.name} {self.raw:04X}h' if self.is_word else self.parameter.name
+
+
+def write_until_answered(
+        writes: Iterable[StopWrite],
+        write: Callable[[StopWrite], Generator[StepT, ReplyT, tuple[ReplyT, int, Sentence]]],
+        ) -> Generator[StepT, ReplyT, list[Sentence]]:
+    """
+    Stop a drive that acknowledges writes, each thing until it is answered or was tried enough.
+
+    :param write: returns what became of one, after how many attempts, and what silence may mean.
+    :return: what failed, in words.
+    """
+    failed: list[Sentence] = []
+    for each in writes:
+        reply, attempts, hint = yield from write(each)
+        if isinstance(reply, Refused):
+            failed.append(sentences.write_refused(each.name, reply.text))
+        elif isinstance(reply, Silence):
+            failed += [sentences.write_not_taken(each.name)] if reply.refused else [
+                sentences.write_not_acknowledged(each.name, attempts), *filter(None, (hint,))]
+    return failed
 
 
 class _Kind(NamedTuple):

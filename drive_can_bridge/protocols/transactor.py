@@ -8,10 +8,13 @@ frames are paced. It knows nothing of procedures, priorities, repetitions and qu
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
 import math
 from typing import Any, Generic, TypeVar
 
-from drive_can_bridge.core.requests import RetryPolicy
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.messages import Sentence
+from drive_can_bridge.core.requests import ABSENT_CODES, Failure, refused, RetryPolicy
 
 #: what an answer that does not say what it answers can be mistaken for
 ANYTHING: Hashable = 'anything'
@@ -21,6 +24,59 @@ StepT = TypeVar('StepT')
 ReplyT = TypeVar('ReplyT')
 #: and what it returns
 ResultT = TypeVar('ResultT')
+ContentT = TypeVar('ContentT')
+
+
+# -- what became of a step, where drives acknowledge writes ---------------------------------------
+
+
+@dataclass(frozen=True)
+class Answered(Generic[ContentT]):
+    """The drive did it; ``content`` is what was read (of a write: nothing in particular)."""
+
+    content: ContentT
+
+
+@dataclass(frozen=True)
+class Refused:
+    """The drive refused it with a code. Nothing was changed."""
+
+    code: int
+    meaning: str = field(default='', compare=False)
+
+    @property
+    def text(self) -> Sentence:
+        """The refusal in words."""
+        return sentences.refused_by_drive(self.code, self.meaning)
+
+    @property
+    def absent(self) -> bool:
+        """The drive says that it has no such object."""
+        return self.code in ABSENT_CODES
+
+    @property
+    def failure(self) -> Failure:
+        """What became of the request."""
+        return refused(self.code, self.text)
+
+
+@dataclass(frozen=True)
+class Silence:
+    """
+    Nobody answered.
+
+    :param sent: False: it was not even sent.
+    :param refused: the bus did not take it.
+    """
+
+    sent: bool = True
+    refused: bool = False
+
+
+SILENT, NOT_TAKEN = Silence(), Silence(sent=False, refused=True)
+
+
+# -- one exchange ---------------------------------------------------------------------------------
 
 
 class Transactor(ABC, Generic[StepT, ReplyT]):
@@ -99,9 +155,9 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
     def attempts(self, step: StepT) -> int:
         """Return how often a step is done until it counts as unanswered."""
 
-    @abstractmethod
     def unanswered(self, step: StepT, reply: ReplyT) -> bool:
         """Return whether a reply says that nobody answered, and a late answer may come."""
+        return isinstance(reply, Silence) and reply.sent
 
     def again(self, step: StepT) -> bool:
         """Return whether a step is the one before once more: what answers either answers both."""

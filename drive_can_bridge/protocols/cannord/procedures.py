@@ -5,24 +5,24 @@ Reading and writing parameters of an inverter, in words that users understand.
 Every generator here is for :class:`.transactor.TaskChannel`.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.requests import (
-    Failure, FailureKind, NOT_SENT, Outcome, Outcomes, ReadValue, RetryPolicy, Written)
+    Failure, FailureKind, Outcome, ReadValue, RetryPolicy, Written)
 from drive_can_bridge.core.roles import Cells
-from drive_can_bridge.protocols.access import Found, Item, OneByOne, ParameterAccess, read_back
+from drive_can_bridge.protocols.access import Found, OneByOne, ParameterAccess, read_back
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    error_text, ParameterFrame, ResponseId, Task, WRITE_TASKS)
+    ParameterFrame, ResponseId, Task, WRITE_TASKS)
 from drive_can_bridge.protocols.cannord.process_data import Samples
 from drive_can_bridge.protocols.cannord.transactor import (
-    ParameterTask, Procedure, TaskChannel, TaskResult)
+    Contradiction, ParameterTask, Procedure, Reply, TaskChannel)
+from drive_can_bridge.protocols.transactor import Answered, Refused
 
 WRONG_INDEX = 3
 PROCESS_DATA_ONLY = sentences.process_data_only()
-NOT_ATOMIC = sentences.not_in_one_frame('a CANnord frame carries one parameter')
 
 
 def cells(parameter: Parameter) -> Cells:
@@ -42,7 +42,7 @@ def write_refusal(parameter: Parameter) -> Sentence:
     return PROCESS_DATA_ONLY if parameter.number is None else NOTHING
 
 
-class TaskAccess(ParameterAccess[Parameter, ParameterTask, TaskResult]):
+class TaskAccess(ParameterAccess[Parameter, ParameterTask, Reply]):
     """
     Parameters by number and sub-index, one a task.
 
@@ -50,6 +50,8 @@ class TaskAccess(ParameterAccess[Parameter, ParameterTask, TaskResult]):
     :param persist: write to EEPROM where the profile does not say where.
     :param signed: where the profile lists words with a sign, which raw names do not have.
     """
+
+    not_atomic = sentences.not_in_one_frame('a CANnord frame carries one parameter')
 
     def __init__(self, channel: TaskChannel, retry: RetryPolicy, *,
                  samples: Samples, persist: bool, signed: Cells) -> None:
@@ -67,13 +69,6 @@ class TaskAccess(ParameterAccess[Parameter, ParameterTask, TaskResult]):
             return Failure(FailureKind.REFUSED, _width_text(span, double=double))
         return (answer.answered,)
 
-    def write(self, items: Sequence[Item]) -> Procedure[Outcomes]:
-        (parameter, raw), = items
-        return ((yield from self._write(parameter, raw)),)
-
-    def misfit(self, items: Sequence[Item]) -> Sentence:
-        return NOT_ATOMIC
-
     def aside(self, parameter: Parameter, *, write: bool) -> Outcome | None:
         if parameter.number is not None:
             return None
@@ -85,7 +80,7 @@ class TaskAccess(ParameterAccess[Parameter, ParameterTask, TaskResult]):
 
     # -- parts ------------------------------------------------------------------------------------
 
-    def _write(self, parameter: Parameter, raw: int) -> Procedure[Outcome]:
+    def write_one(self, parameter: Parameter, raw: int) -> Procedure[Outcome]:
         """
         Write one parameter; the response acknowledges it.
 
@@ -119,30 +114,20 @@ class TaskAccess(ParameterAccess[Parameter, ParameterTask, TaskResult]):
                    ) -> Procedure[ParameterFrame | Failure]:
         """Send a task; return the response, or why there is none that counts."""
         reply = yield ParameterTask(task, parameter.number or 0, parameter.subindex or 0, value)
-        if reply.response is not None:
-            if reply.response.identifier != ResponseId.REFUSED:
-                return reply.response
-            return (yield from _refusal(parameter, reply.response))
-        if not reply.sent:
-            return NOT_SENT
-        if reply.contrary is not None:
+        if isinstance(reply, Answered):
+            return reply.content
+        if isinstance(reply, Contradiction) and reply.response is not None:
             # without its sign where users see none
             wrote = parameter.raw_from_word(parameter.word_from_raw(value)) if (
                 parameter.width_known) else value
-            return read_back(parameter, parameter.raw_from_word(reply.contrary.answered), wrote)
-        return self.retry.unanswered(attempts)
-
-
-def _refusal(parameter: Parameter, response: ParameterFrame) -> Procedure[Failure]:
-    """Return why the drive refused; where an element does not exist, also how many there are."""
-    text = error_text(response.word)
-    if response.word == WRONG_INDEX and parameter.subindex is not None:
-        reply = yield ParameterTask(Task.READ_ELEMENTS, parameter.number or 0)
-        answer = reply.response
-        if answer is not None and answer.identifier == ResponseId.ELEMENTS:
-            return Failure(FailureKind.REFUSED, sentences.no_such_element(
-                response.word, text, parameter.number or 0, answer.word))
-    return Failure(FailureKind.REFUSED, sentences.refused_by_drive(response.word, text))
+            return read_back(parameter, parameter.raw_from_word(reply.response.answered), wrote)
+        if isinstance(reply, Refused) and reply.code == WRONG_INDEX and (
+                parameter.subindex is not None):
+            found = yield ParameterTask(Task.READ_ELEMENTS, parameter.number or 0)
+            if isinstance(found, Answered) and found.content.identifier == ResponseId.ELEMENTS:
+                return Failure(FailureKind.REFUSED, sentences.no_such_element(
+                    reply.code, reply.meaning, parameter.number or 0, found.content.word))
+        return self.failed(reply, attempts)
 
 
 def _width_text(parameter: Parameter, *, double: bool) -> Sentence:

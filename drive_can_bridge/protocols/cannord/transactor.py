@@ -15,7 +15,7 @@ between, and look like the response to that write.
 
 from collections.abc import Generator, Hashable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Union
 
 from drive_can_bridge.core import frame_sentences, sentences
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
@@ -23,9 +23,10 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    ParameterFrame, ParameterLayout, ResponseId, Task)
+    error_text, ParameterFrame, ParameterLayout, ResponseId, Task)
 from drive_can_bridge.protocols.channel import Channel
-from drive_can_bridge.protocols.transactor import ResultT, Transactor
+from drive_can_bridge.protocols.transactor import (
+    Answered, NOT_TAKEN, Refused, ResultT, Silence, SILENT, Transactor)
 
 
 @dataclass(frozen=True)
@@ -42,25 +43,17 @@ class ParameterTask:
     value: int = 0
 
 
-class TaskResult(NamedTuple):
-    """
-    What became of a task.
+@dataclass(frozen=True)
+class Contradiction(Silence):
+    """Nothing but the response to a write that has another value than the one written."""
 
-    :param response: None when nobody answered after all attempts.
-    :param contrary: the response to a write that has another value than the one written.
-    :param sent: False for a write that the bus refused.
-    """
-
-    response: ParameterFrame | None
-    contrary: ParameterFrame | None = None
-    sent: bool = True
+    response: ParameterFrame | None = None
 
 
-SILENT = TaskResult(None)
-NOT_SENT = TaskResult(None, sent=False)
+Reply = Union[Answered[ParameterFrame], Refused, Silence]
 
 
-class TaskTransactor(Transactor[ParameterTask, TaskResult]):
+class TaskTransactor(Transactor[ParameterTask, Reply]):
     """
     Hands tasks to the inverter, and tells which response belongs to them.
 
@@ -83,11 +76,11 @@ class TaskTransactor(Transactor[ParameterTask, TaskResult]):
         def left(sent: bool, then: float) -> None:
             # a read that the bus refused is repeated when its time is over
             if not sent and step.task.writes:
-                self.end(step, NOT_SENT, then)
+                self.end(step, NOT_TAKEN, then)
         payload = self._layout.encode(step.task, step.number, step.index, step.value)
         self._outbox.put(Frame(self._identifier, payload, self._extended), left)
 
-    def receive(self, answer: bytes, now: float) -> TaskResult:
+    def receive(self, answer: bytes, now: float) -> Reply:
         response, task = self._layout.decode(answer), self.step
         if task is None:
             raise Unasked(sentences.unasked('parameter response'))
@@ -95,13 +88,13 @@ class TaskTransactor(Transactor[ParameterTask, TaskResult]):
             raise Unasked(frame_sentences.other_task_answered(
                 response.identifier, response.number, response.index,
                 task.task, task.number, task.index))
-        if task.task.writes and response.identifier != ResponseId.REFUSED and not _echoes(
-                response, task):
-            self.silent = TaskResult(None, response)
+        refused = response.identifier == ResponseId.REFUSED
+        if task.task.writes and not refused and not _echoes(response, task):
+            self.silent = Contradiction(response=response)
             raise RemoteProtocolError(
                 frame_sentences.other_value_echoed(task.number, task.index))
         self.finish()
-        return TaskResult(response)
+        return Refused(response.word, error_text(response.word)) if refused else Answered(response)
 
     def answers(self, answer: bytes, step: ParameterTask) -> bool:
         """Return whether a response may be that to a task that was given up."""
@@ -110,16 +103,13 @@ class TaskTransactor(Transactor[ParameterTask, TaskResult]):
     def attempts(self, step: ParameterTask) -> int:
         return 1 if step.task.writes else self.retry.attempts
 
-    def unanswered(self, step: ParameterTask, reply: TaskResult) -> bool:
-        return reply is self.silent
-
     def key(self, step: ParameterTask) -> Hashable:
         return step.number      # a late refusal may not say of which element
 
 
-TaskChannel = Channel[ParameterTask, TaskResult]
+TaskChannel = Channel[ParameterTask, Reply]
 #: yields steps, is sent what became of each, and returns something
-Procedure = Generator[ParameterTask, TaskResult, ResultT]
+Procedure = Generator[ParameterTask, Reply, ResultT]
 
 
 def _belongs(response: ParameterFrame, task: ParameterTask) -> bool:

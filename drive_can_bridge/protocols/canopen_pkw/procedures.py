@@ -9,14 +9,15 @@ from collections.abc import Hashable, Sequence
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
-from drive_can_bridge.core.requests import NOT_SENT, Outcome, Outcomes, Written
+from drive_can_bridge.core.requests import Outcome, Outcomes, Written
 from drive_can_bridge.core.stop_duty import Happened, StopDuty
 from drive_can_bridge.protocols.access import Found, Item, ParameterAccess
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
 from drive_can_bridge.protocols.canopen_pkw.transactor import (
-    Answered, Procedure, Refused, RegisterRead, RegisterWrite, Reply, Silence, Step)
+    Procedure, RegisterRead, RegisterWrite, Reply, Step)
 from drive_can_bridge.protocols.safe_stop import STOP_ATTEMPTS, StopWrite
+from drive_can_bridge.protocols.transactor import Answered, Refused, Silence, SILENT
 
 NOT_TOGETHER = sentences.not_in_one_frame(
     'two 16-bit parameters in adjacent registers fit, or one of 32 bits')
@@ -31,9 +32,8 @@ class RegisterAccess(ParameterAccess[Span, Step, Reply]):
     def read(self, span: Span) -> Procedure[Found]:
         reply = yield RegisterRead(span.address, span.count)
         if isinstance(reply, Answered):
-            return reply.words[:span.count]
-        return (self.retry.unanswered() if isinstance(reply, Silence) else
-                reply.failure)
+            return reply.content[:span.count]
+        return reply.failure if isinstance(reply, Refused) else self.retry.unanswered()
 
     def write(self, items: Sequence[Item]) -> Procedure[Outcomes]:
         return self._write(items, blind=False)
@@ -67,12 +67,8 @@ class RegisterAccess(ParameterAccess[Span, Step, Reply]):
             reply = yield write
             if isinstance(reply, Answered):
                 return Written()
-            if isinstance(reply, Refused):
-                return reply.failure
-            if reply.refused:
-                return NOT_SENT
-            if reply.sent:
-                return self.retry.unanswered(1)
+            if isinstance(reply, Refused) or reply.refused or reply.sent:
+                return self.failed(reply, 1)
         return self.retry.unanswered()
 
 
@@ -104,34 +100,22 @@ def tell(duty: StopDuty, channel: Hashable, write: RegisterWrite, *, runs: bool,
 # -- the stop -------------------------------------------------------------------------------------
 
 
-#: what became of the last writes: why which one may not have been executed
-StopProcedure = Procedure[list[Sentence]]
-
-
-def write_until_answered(writes: Sequence[StopWrite], placement: Placement, timeout: float,
-                         last: float) -> StopProcedure:
+def write_blind_until_answered(
+        placement: Placement, each: StopWrite, timeout: float, last: float,
+        ) -> Procedure[tuple[Reply, int, Sentence]]:
     """
-    Stop a drive, each thing until it is answered or was tried three times.
+    Write one thing that stops a drive until it is answered or was tried three times.
 
     It may be executed twice: that does no harm. As the toggle is inverted with every attempt, not
     even an unknown function byte of the device keeps it from taking notice.
 
     :param timeout: s for each attempt but the last.
     :param last: s for that.
-    :return: what failed, in words.
     """
-    failed: list[Sentence] = []
-    for parameter, raw, is_word in writes:
-        name = f'{parameter.name} {raw:04X}h' if is_word else parameter.name
-        reply: Reply = Silence()
-        for attempt in range(1, STOP_ATTEMPTS + 1):
-            reply = yield RegisterWrite.of(placement, parameter, raw, blind=True,
-                                   timeout=last if attempt == STOP_ATTEMPTS else timeout)
-            if not isinstance(reply, Silence):
-                break
-        if isinstance(reply, Refused):
-            failed.append(sentences.write_refused(name, reply.text))
-        elif isinstance(reply, Silence):
-            failed.append(sentences.write_not_taken(name) if reply.refused else
-                          sentences.write_not_acknowledged(name, STOP_ATTEMPTS))
-    return failed
+    reply: Reply = SILENT
+    for attempt in range(1, STOP_ATTEMPTS + 1):
+        reply = yield RegisterWrite.of(placement, each.parameter, each.raw, blind=True,
+                                       timeout=last if attempt == STOP_ATTEMPTS else timeout)
+        if not isinstance(reply, Silence):
+            break
+    return reply, STOP_ATTEMPTS, NOTHING

@@ -11,9 +11,10 @@ from drive_can_bridge.protocols.canopen_pkw.addresses import (
     instead_of, Placement, round_plan, round_spans, Span)
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
 from drive_can_bridge.protocols.canopen_pkw.transactor import (
-    MailboxChannel, Procedure, Refused, RegisterRead, Silence)
+    MailboxChannel, Procedure, RegisterRead)
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.polled_exchange import Raws
+from drive_can_bridge.protocols.transactor import Refused, Silence
 
 
 class Rounds:
@@ -66,7 +67,7 @@ class Rounds:
                 pending[:0] = self._instead(span, reply)
                 continue
             self.refusals.pop(span, None)
-            found = dict(zip(span.addresses, reply.words))
+            found = dict(zip(span.addresses, reply.content))
             self._words.update(found)
             if self._session.online:
                 self._take_status(found)

@@ -46,19 +46,18 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import dropwhile
 import math
-from typing import Any, NamedTuple, Union
+from typing import Any, Union
 
-from drive_can_bridge.core import sentences
-from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.requests import Failure, refused, RetryPolicy
+from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, PkwMessage
 from drive_can_bridge.protocols.channel import Channel, LATE_MAX, STOP_PATIENCE
-from drive_can_bridge.protocols.transactor import ResultT, Transactor
+from drive_can_bridge.protocols.transactor import (
+    Answered, NOT_TAKEN, Refused, ResultT, Silence, Transactor)
 
 #: s that an answer to function 00h is waited for at most
 SYNCHRONISATION_TIMEOUT = 0.1
@@ -117,41 +116,8 @@ class RegisterWrite:
 Step = Union[RegisterRead, RegisterWrite]
 
 
-class Answered(NamedTuple):
-    """The device did it; ``words`` are those read (of a write: nothing in particular)."""
-
-    words: pkw.Words
-
-
-class Refused(NamedTuple):
-    """The device refused it with an abort code. Nothing was changed."""
-
-    code: int
-
-    @property
-    def text(self) -> Sentence:
-        """The refusal in words."""
-        return sentences.refused_by_drive(self.code, pkw.describe(self.code))
-
-    @property
-    def failure(self) -> Failure:
-        """What became of the request."""
-        return refused(self.code, self.text)
-
-
-class Silence(NamedTuple):
-    """
-    Nobody answered.
-
-    :param sent: False: it was not even sent, because the mailbox could not be synchronised.
-    :param refused: the bus did not take it.
-    """
-
-    sent: bool = True
-    refused: bool = False
-
-
-Reply = Union[Answered, Refused, Silence]
+#: not sent, and not refused by the bus: the mailbox could not be synchronised
+Reply = Union[Answered[pkw.Words], Refused, Silence]
 #: yields steps, is sent what became of each, and returns something
 Procedure = Generator[Step, Reply, ResultT]
 
@@ -261,7 +227,8 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._synchronised = True
         self.finish()
         if answer.code == Function.ERROR:
-            return Refused(pkw.code_from_words(answer.words, self._order))
+            code = pkw.code_from_words(answer.words, self._order)
+            return Refused(code, pkw.describe(code))
         return Answered(answer.words)
 
     def handle_timer(self, now: float) -> Reply | bool:
@@ -408,7 +375,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
         again = isinstance(step, RegisterWrite) and step.blind
         if now >= self._until or self._abandoned or isinstance(step, RegisterWrite) and not again:
             self.finish()   # what the device's last function byte is, is as known as before
-            return Silence(sent=False, refused=True)
+            return NOT_TAKEN
         if again and now >= refused_at + REFUSED_PAUSE:
             until, self._refused_at, self._late = self._until, None, True
             self._send_step(step, now)

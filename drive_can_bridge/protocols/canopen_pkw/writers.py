@@ -32,13 +32,14 @@ from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import CONTROL_WORD
 from drive_can_bridge.protocols.acyclic_output import Acknowledged, AcyclicOutput
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
-from drive_can_bridge.protocols.canopen_pkw.procedures import tell, write_until_answered
+from drive_can_bridge.protocols.canopen_pkw.procedures import tell, write_blind_until_answered
 from drive_can_bridge.protocols.canopen_pkw.transactor import (
-    Answered, MailboxChannel, Procedure, Refused, RegisterRead, RegisterWrite, Reply, Silence,
-    Step)
+    MailboxChannel, Procedure, RegisterRead, RegisterWrite, Reply, Step)
 from drive_can_bridge.protocols.channel import Priority, STOP_PATIENCE
 from drive_can_bridge.protocols.polled_exchange import TOLERANCE
-from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead, STOP_ATTEMPTS, StopAgain
+from drive_can_bridge.protocols.safe_stop import (
+    SafeStop, StatusRead, STOP_ATTEMPTS, StopAgain, write_until_answered)
+from drive_can_bridge.protocols.transactor import Answered, Refused, Silence
 
 #: s that a stop may take all together: of a drive that answers, and of one that has fallen silent
 STOP_TIME = 3.0
@@ -315,7 +316,7 @@ class Writers:
         reply = yield RegisterRead(span.address, span.count, attempts=1)
         if not isinstance(reply, Answered):
             return None
-        found = self._placement.raw(parameter, reply.words)
+        found = self._placement.raw(parameter, reply.content)
         return parameter.word_from_raw(found) == parameter.word_from_raw(word)
 
     def _word_arrived(self, word: int) -> None:
@@ -368,15 +369,14 @@ class Writers:
         timeout = min(patience, STOP_PATIENCE if again else (
             self.stop_time / (STOP_ATTEMPTS * max(1, len(writes)))))
         ends = not self._session.active
-        self._stop.begin(
-            write_until_answered(
-                writes, self._placement, timeout, timeout if ends else patience),
+        self._stop.begin(write_until_answered(writes, lambda each: write_blind_until_answered(
+            self._placement, each, timeout, timeout if ends else patience)),
             now, insist=ends, again=again)
 
     def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Step, Reply]:
         span = self._placement.span(status)
         reply = yield RegisterRead(span.address, span.count, attempts=1, timeout=timeout)
-        return self._placement.raw(status, reply.words) if isinstance(reply, Answered) else None
+        return self._placement.raw(status, reply.content) if isinstance(reply, Answered) else None
 
     # -- what the drive refuses -------------------------------------------------------------------
 

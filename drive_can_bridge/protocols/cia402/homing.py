@@ -34,7 +34,9 @@ from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.node_set_up import POLL_PERIOD
 from drive_can_bridge.protocols.cia402.standstill import Band, IN_A_ROW, LONG, place_of, STILL
 from drive_can_bridge.protocols.cia402.state_machine import DriveRules
-from drive_can_bridge.protocols.cia402.transactor import Procedure, SdoChannel, Transfer
+from drive_can_bridge.protocols.cia402.transactor import (
+    ObjectRead, Procedure, SdoChannel, Transfer)
+from drive_can_bridge.protocols.transactor import Refused
 
 _DONE = states.BIT_12 | states.TARGET_REACHED
 #: 6098h: the present position becomes the reference, and nothing moves
@@ -265,7 +267,7 @@ class Homing:
     @staticmethod
     def _write(mode: int, attempts: int = 1) -> Procedure[Sentence]:
         reply = yield Transfer(states.MODE, 0, mode.to_bytes(1, 'little'), attempts=attempts)
-        return NOTHING if reply.data is not None else sentences.mode_refused(mode)
+        return NOTHING if isinstance(reply, ObjectRead) else sentences.mode_refused(mode)
 
     def _written(self, failure: Sentence) -> None:
         if self._step is not HomingStep.LEAVING:
@@ -287,14 +289,16 @@ class Homing:
             until = self._channel.now + self._session.configuration.control_timeout
             while self._step is step and self._machine.operating and self._channel.now < until:
                 shown = yield Transfer(states.MODE_SHOWN)
-                if shown.abort is not None or shown.data and shown.data[0] == mode:
+                if isinstance(shown, Refused) or isinstance(shown, ObjectRead) and (
+                        shown.content[:1] == bytes((mode,))):
                     break
                 yield Transfer(pause=POLL_PERIOD)
             else:
                 return sentences.mode_refused(mode)
             if mode == states.HOMING_MODE:
-                method = (yield Transfer(states.HOMING_METHOD)).data
-                self._on_the_spot = method is not None and method[:1] in _ON_THE_SPOT
+                method = yield Transfer(states.HOMING_METHOD)
+                self._on_the_spot = isinstance(method, ObjectRead) and (
+                    method.content[:1] in _ON_THE_SPOT)
             return NOTHING
         # PDOs do not pass through the channel: its own time may be that of long ago
         self._channel.run(look(), then, self._now)

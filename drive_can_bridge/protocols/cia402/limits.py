@@ -23,7 +23,9 @@ from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.text import value_text
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.mapped import named
-from drive_can_bridge.protocols.cia402.transactor import Procedure, SdoChannel, Transfer
+from drive_can_bridge.protocols.cia402.transactor import (
+    ObjectRead, Procedure, SdoChannel, Transfer)
+from drive_can_bridge.protocols.transactor import Refused
 
 #: s that a drive may take to show what it was sent
 LIMIT_TIME = 0.5
@@ -131,14 +133,14 @@ class LimitCheck:
         while True:
             reply = yield Transfer(parameter.index or 0, parameter.subindex or 0, attempts=1)
             now, sent = self._channel.now, self._word(limit)
-            if sent is None or reply.abort is not None:
+            if sent is None or isinstance(reply, Refused):
                 limit.looked_for, limit.over = sent, True
                 return
             if not tried or sent != limit.before and tried == {limit.before}:
                 until = now + LIMIT_TIME
             tried.add(sent)
-            if reply.data is not None:
-                shown = int.from_bytes(reply.data[:length], 'little')
+            if isinstance(reply, ObjectRead):
+                shown = reply.number(length)
                 in_effect = shown == sent or shown in tried and shown != limit.before
                 if in_effect or now >= until:
                     self._judge(limit, shown, sent, in_effect=in_effect)

@@ -13,11 +13,11 @@ from collections.abc import Iterable
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import Sentence, together
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.objects import at_object, differs, ObjectAccess
 from drive_can_bridge.protocols.cia402.pdo import Pdo
-from drive_can_bridge.protocols.cia402.transactor import Procedure, Transfer, TransferResult
+from drive_can_bridge.protocols.cia402.transactor import ObjectRead, Procedure, Reply, Transfer
+from drive_can_bridge.protocols.transactor import Refused
 
 
 def named(parameter: Parameter) -> str:
@@ -25,7 +25,7 @@ def named(parameter: Parameter) -> str:
     return f'{parameter.name} ({at_object(parameter.index or 0, parameter.subindex or 0)})'
 
 
-def read_mapped(objects: ObjectAccess, pdos: Iterable[Pdo], status: TransferResult,
+def read_mapped(objects: ObjectAccess, pdos: Iterable[Pdo], status: Reply,
                 ) -> Procedure[dict[Parameter, int]]:
     """
     Read all that PDOs are to carry.
@@ -36,21 +36,22 @@ def read_mapped(objects: ObjectAccess, pdos: Iterable[Pdo], status: TransferResu
     """
     wanted = {(each.index or 0, each.subindex or 0): each for one in pdos
               for each in one.parameters}
-    judged = status.padded is False     # sizes mean something
+    # sizes mean something
+    judged = isinstance(status, ObjectRead) and status.padded is False
     found: dict[Parameter, int] = {}
     missing: list[Sentence] = []
     for place, parameter in wanted.items():
         reply = yield from objects.transfer(Transfer(*place))
         length = pdo.width(parameter)
-        if reply.abort in sdo.ABSENT:
+        if isinstance(reply, Refused) and reply.absent:
             missing.append(sentences.of_object(named(parameter), sentences.no_such_object()))
-        elif reply.data is None:
+        elif isinstance(reply, Refused):
             continue
-        elif judged and reply.sized and len(reply.data) != length:
+        elif judged and reply.sized and len(reply.content) != length:
             missing.append(sentences.of_object(named(parameter), sentences.other_length(
-                len(reply.data), parameter.type.value)))
+                len(reply.content), parameter.type.value)))
         else:
-            found[parameter] = int.from_bytes(reply.data[:length], 'little')
+            found[parameter] = reply.number(length)
     if missing:
         raise differs(together(missing))
     return found

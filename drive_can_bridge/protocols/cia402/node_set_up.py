@@ -21,22 +21,23 @@ from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.stop_duty import Happened
-from drive_can_bridge.protocols.canopen import network, sdo
+from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import START_PAUSE, WatchedNode
 from drive_can_bridge.protocols.cia402 import pdo, states, stop_options
 from drive_can_bridge.protocols.cia402.limits import LimitCheck
 from drive_can_bridge.protocols.cia402.mapped import read_mapped
 from drive_can_bridge.protocols.cia402.objects import (
-    at_object, differs, ObjectAccess, SetUpEnd, SetUpOutcome, SetUpState, silent)
+    at_object, differs, ObjectAccess, SetUpEnd, SetUpOutcome, SetUpState)
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.pdo_set_up import PdoSetUp
 from drive_can_bridge.protocols.cia402.state_machine import DISABLE_WORDS, DriveRules
 from drive_can_bridge.protocols.cia402.states import MODES, ServoState
 from drive_can_bridge.protocols.cia402.sync import SyncProducer
 from drive_can_bridge.protocols.cia402.transactor import (
-    Procedure, SdoChannel, Transfer, TransferResult)
+    ObjectRead, Procedure, Reply, SdoChannel, Transfer)
 from drive_can_bridge.protocols.cia402.watch import BridgeWatch
+from drive_can_bridge.protocols.transactor import Refused, Silence
 
 SYNC_COB_ID, SYNC_PERIOD, SYNC_COUNTER = 0x1005, 0x1006, 0x1019
 PRODUCER = 0x1017
@@ -106,7 +107,7 @@ class NodeSetUp:
         """Do it; returns a :class:`SetUpOutcome`."""
         self._asked_at = min(self._asked_at, self._channel.now)
         reply = yield Transfer(states.STATUS_WORD)
-        if silent(reply):
+        if isinstance(reply, Silence):
             if self._node.heard_at > self._asked_at:
                 yield from self._tell_blindly(attempts=1)
             return SetUpOutcome(SetUpState.ABSENT)
@@ -147,7 +148,7 @@ class NodeSetUp:
 
     # -- the steps --------------------------------------------------------------------------------
 
-    def _stand_still(self, reply: TransferResult) -> Procedure[int]:
+    def _stand_still(self, reply: ObjectRead | Refused) -> Procedure[int]:
         """
         Disable a drive that is found enabled, before anything else is touched.
 
@@ -157,11 +158,11 @@ class NodeSetUp:
         looks, word, refusal = 0, -1, NOTHING
         until = self._channel.now + self._drive.control_timeout
         while True:
-            if reply.data is None:
+            if isinstance(reply, Refused):
                 yield from self._tell_blindly()
                 raise differs(sentences.object_refused(
-                    at_object(states.STATUS_WORD), sdo.describe(reply.abort or 0)))
-            raw = int.from_bytes(reply.data[:2], 'little')
+                    at_object(states.STATUS_WORD), reply.meaning))
+            raw = reply.number(2)
             state = states.state_of(raw)
             self._rules.standstill.status(raw, self._channel.now)
             if state not in states.MOVING:
@@ -251,7 +252,7 @@ class NodeSetUp:
         else:       # it may send them as it is
             self.tell(refusal)
 
-    def _look_at_objects(self, status: TransferResult) -> Procedure[None]:
+    def _look_at_objects(self, status: Reply) -> Procedure[None]:
         """See that all is there that is to be mapped, and that limits are not without effect."""
         drive = self._drive
         without_effect = self._limits.found((yield from read_mapped(

@@ -13,7 +13,8 @@ from enum import Enum
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import sdo
-from drive_can_bridge.protocols.cia402.transactor import Procedure, Transfer, TransferResult
+from drive_can_bridge.protocols.cia402.transactor import ObjectRead, Procedure, Transfer
+from drive_can_bridge.protocols.transactor import Refused, Silence
 
 
 
@@ -68,12 +69,12 @@ class ObjectAccess:
         """The drive says that it has no such object as was asked for last."""
         return self.abort in sdo.ABSENT
 
-    def transfer(self, ask: Transfer) -> Procedure[TransferResult]:
+    def transfer(self, ask: Transfer) -> Procedure[ObjectRead | Refused]:
         """Do one transfer. :raises SetUpEnd: nobody answers."""
         reply = yield ask
-        if silent(reply):
+        if isinstance(reply, Silence):
             raise SetUpEnd(SetUpOutcome(SetUpState.SILENT))
-        self.abort = reply.abort
+        self.abort = reply.code if isinstance(reply, Refused) else None
         return reply
 
     def read(self, index: int, subindex: int = 0, length: int = 4, *, signed: bool = False,
@@ -85,10 +86,10 @@ class ObjectAccess:
         :raises SetUpEnd: nobody answers.
         """
         reply = yield from self.transfer(Transfer(index, subindex))
-        if reply.data is None:
+        if isinstance(reply, Refused):
             return None
         word = reply.word(length, signed=signed)
-        data = reply.data if word is None else word.to_bytes(length, 'little')
+        data = reply.content if word is None else word.to_bytes(length, 'little')
         return int.from_bytes(data, 'little', signed=signed)
 
     def put(self, index: int, subindex: int, value: int, length: int, meant: str = '',
@@ -101,19 +102,14 @@ class ObjectAccess:
         """
         data = (value & (1 << 8 * length) - 1).to_bytes(length, 'little')
         reply = yield from self.transfer(Transfer(index, subindex, data, attempts=self._attempts))
-        return NOTHING if reply.abort is None else sentences.object_refused(
-            what=at_object(index, subindex), why=sdo.describe(reply.abort), meant=meant)
+        return NOTHING if isinstance(reply, ObjectRead) else sentences.object_refused(
+            what=at_object(index, subindex), why=reply.meaning, meant=meant)
 
     def must(self, index: int, subindex: int, value: int, length: int) -> Procedure[None]:
         """Write a number. :raises SetUpEnd: nobody answers, or the drive refuses."""
         refusal = yield from self.put(index, subindex, value, length)
         if refusal:
             raise differs(refusal)
-
-
-def silent(reply: TransferResult) -> bool:
-    """Return whether nobody answered."""
-    return reply.data is None and reply.abort is None
 
 
 def differs(text: Sentence, remedy: Callable[[str], Sentence] = sentences.drive_to_correct,

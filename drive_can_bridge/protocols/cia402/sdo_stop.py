@@ -12,16 +12,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.messages import Sentence
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import WatchedNode
 from drive_can_bridge.protocols.cia402.pdo import width
-from drive_can_bridge.protocols.cia402.procedures import refused
-from drive_can_bridge.protocols.cia402.transactor import (
-    Procedure, SdoChannel, SILENT, Transfer, TransferResult)
-from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, STOP_ATTEMPTS, StopWrite
+from drive_can_bridge.protocols.cia402.transactor import Procedure, Reply, SdoChannel, Transfer
+from drive_can_bridge.protocols.safe_stop import (
+    ANSWER_TIME, STOP_ATTEMPTS, StopWrite, write_until_answered)
+from drive_can_bridge.protocols.transactor import SILENT
 
 #: s between two NMT commands to a node that may be stopped, and for which they are repeated
 NMT_SPACING, NMT_TIME = 0.05, 1.0
@@ -56,29 +56,21 @@ class SdoStop:
         :param unheard: it was told by cycles, and has answered none.
         :return: what failed, in words.
         """
-        failed: list[Sentence] = []
         began, nmt = self._channel.now, self._session.configuration.options.nmt_start
-        for parameter, raw, is_word in writes:
-            name = f'{parameter.name} {raw:04X}h' if is_word else parameter.name
-            place = parameter.index or 0, parameter.subindex or 0
-            data = parameter.word_from_raw(raw).to_bytes(width(parameter), 'little')
-            attempts = STOP_ATTEMPTS
-            if is_word:
-                reply, attempts = yield from self._word(
-                    Transfer(*place, data, attempts=1, timeout=self._timeout), unheard=unheard)
-            else:
-                reply = yield Transfer(*place, data, attempts=attempts, timeout=self._timeout)
-            if reply.abort is not None:
-                failed.append(sentences.write_refused(name, refused(reply.abort).reason))
-            elif not reply.sent:
-                failed.append(sentences.write_not_taken(name))
-            elif reply.data is None:
-                failed.append(sentences.write_not_acknowledged(name, attempts))
-                if is_word and not nmt and self._may_be_stopped(began):
-                    failed.append(sentences.node_may_be_stopped())
-        return failed
 
-    def _word(self, word: Transfer, *, unheard: bool) -> Procedure[tuple[TransferResult, int]]:
+        def write(each: StopWrite) -> Procedure[tuple[Reply, int, Sentence]]:
+            parameter = each.parameter
+            data = parameter.word_from_raw(each.raw).to_bytes(width(parameter), 'little')
+            step = Transfer(parameter.index or 0, parameter.subindex or 0, data,
+                            attempts=STOP_ATTEMPTS, timeout=self._timeout)
+            if not each.is_word:
+                return (yield step), STOP_ATTEMPTS, NOTHING
+            reply, attempts = yield from self._word(replace(step, attempts=1), unheard=unheard)
+            hint = not nmt and self._may_be_stopped(began)
+            return reply, attempts, sentences.node_may_be_stopped() if hint else NOTHING
+        return write_until_answered(writes, write)
+
+    def _word(self, word: Transfer, *, unheard: bool) -> Procedure[tuple[Reply, int]]:
         """Write the control word; return what became of it, and the number of attempts."""
         began, attempts = self._channel.now, 0
         waited = began if unheard else began + _ATTEMPTS_UNTIL_NMT * self._answer_time
@@ -94,11 +86,11 @@ class SdoStop:
             if reply is not SILENT:
                 return reply, attempts
 
-    def _wake(self, word: Transfer, attempts: int) -> Procedure[tuple[TransferResult, int]]:
+    def _wake(self, word: Transfer, attempts: int) -> Procedure[tuple[Reply, int]]:
         """Send NMT so that the node answers SDO, and the control word behind it, till it does."""
         until = self._channel.now + NMT_TIME - 0.5 * NMT_SPACING
         command = network.encode_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, self._node.number)
-        reply = SILENT
+        reply: Reply = SILENT
         while reply is SILENT and self._channel.now < until:
             self._session.outbox.put(command)
             reply = yield replace(word, timeout=NMT_SPACING, again=attempts > 0)

@@ -34,6 +34,7 @@ from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.status_reports import Wording
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
+from drive_can_bridge.protocols.access import OneByOne
 from drive_can_bridge.protocols.answers import CycleAnswers
 from drive_can_bridge.protocols.canopen import masters, network, sdo
 from drive_can_bridge.protocols.canopen.network import NmtState
@@ -60,11 +61,12 @@ from drive_can_bridge.protocols.cia402.states import (
 from drive_can_bridge.protocols.cia402.stop_options import OPTIONS, stops_by
 from drive_can_bridge.protocols.cia402.sync import EventTimer, FreeSync, SyncProducer, SyncSlot
 from drive_can_bridge.protocols.cia402.transactor import (
-    Procedure, SdoChannel, SdoTransactor, Transfer, TransferResult)
+    ObjectRead, Procedure, Reply, SdoChannel, SdoTransactor, Transfer)
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange, EXPIRY_SPACING
 from drive_can_bridge.protocols.lifecycle import Lifecycle, Script
 from drive_can_bridge.protocols.safe_stop import (
     ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS, StopAgain, StopWrite)
+from drive_can_bridge.protocols.transactor import Silence
 
 #: s until a drive that differs, or runs on, is looked at again
 LOOK_AGAIN = 1.0
@@ -105,8 +107,8 @@ class Cia402Session(Session):
         self._node = WatchedNode(drive.station, heartbeat_timeout=options.heartbeat_timeout)
         self._transactor = SdoTransactor(drive.station, self.outbox, self.retry, self.sent)
         self._channel: SdoChannel = Channel(self._transactor)
-        self.services = DriveServices(self, SdoAccess(self._channel, self.retry))
-        self._stop: SafeStop[Transfer, TransferResult] = SafeStop(
+        self.services = DriveServices(self, SdoAccess(self._channel, self.retry, OneByOne()))
+        self._stop: SafeStop[Transfer, Reply] = SafeStop(
             self, self._channel, self._stop_by_sdo_ended, None, self._read_status,
             word=CONTROL_PARAMETER)
         self._again = StopAgain(self, self._channel, self._stop, partial(
@@ -636,11 +638,11 @@ class Cia402Session(Session):
         state = ServoState.UNKNOWN
         while True:
             reply = yield Transfer(states.STATUS_WORD, timeout=self._stop.answer_time, attempts=1)
-            if reply.data is not None:
-                raw = int.from_bytes(reply.data[:2], 'little')
+            if isinstance(reply, ObjectRead):
+                raw = reply.number(2)
                 state = state_of(raw)
                 self._standstill.status(raw, self._channel.now)
-            known = reply.abort is not None or reply.data is not None
+            known = not isinstance(reply, Silence)
             if known and state not in states.MOVING or self._channel.now >= self._stop_until:
                 return state
             if self._standstill.watching:
@@ -649,10 +651,9 @@ class Cia402Session(Session):
                 yield Transfer(states.CONTROL_WORD, 0, bytes(2), timeout=self._stop.answer_time)
             yield Transfer(pause=POLL_PERIOD)
 
-    def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Transfer,
-                                                                            TransferResult]:
+    def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Transfer, Reply]:
         reply = yield Transfer(states.STATUS_WORD, timeout=timeout, attempts=1)
-        return None if reply.data is None else int.from_bytes(reply.data, 'little')
+        return reply.number() if isinstance(reply, ObjectRead) else None
 
     def _stop_by_sdo_ended(self) -> None:
         if self.stage is Stage.STOPPING and not self.exchange.cycling:

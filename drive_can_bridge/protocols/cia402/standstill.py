@@ -25,11 +25,12 @@ import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.pdo import response_pdos
 from drive_can_bridge.protocols.cia402.states import ServoState, state_of
-from drive_can_bridge.protocols.cia402.transactor import Procedure, SdoChannel, Transfer
+from drive_can_bridge.protocols.cia402.transactor import (
+    ObjectRead, Procedure, SdoChannel, Transfer)
+from drive_can_bridge.protocols.transactor import Refused, Silence
 
 #: s for which nothing may say that the axis moves
 STILL = 0.5
@@ -181,26 +182,25 @@ class Standstill:
         """
         if self._threshold is None:
             reply = yield Transfer(states.VELOCITY_THRESHOLD, attempts=1)
-            if reply.data is not None or reply.abort is not None:   # one that is refused is 0
-                self._threshold = int.from_bytes((reply.data or b'')[:2], 'little')
+            if not isinstance(reply, Silence):      # one that is refused is 0
+                self._threshold = 0 if isinstance(reply, Refused) else reply.number(2)
         if self._velocity_object and not (sampled and self._velocity_object in self._places):
             reply = yield Transfer(self._velocity_object, attempts=1)
-            if reply.abort in sdo.ABSENT:
-                self._velocity_object = _INSTEAD[self._velocity_object]
-            elif reply.data is None:
-                self._mute.add(self._velocity_object)
-            else:
+            if isinstance(reply, ObjectRead):
                 length = 2 if self._velocity_object == states.VELOCITY_VL else 4
-                self._take_velocity(
-                    int.from_bytes(reply.data[:length], 'little', signed=True), channel.now)
+                self._take_velocity(reply.number(length, signed=True), channel.now)
+            elif isinstance(reply, Refused) and reply.absent:
+                self._velocity_object = _INSTEAD[self._velocity_object]
+            else:
+                self._mute.add(self._velocity_object)
         if self._position_object and not (sampled and self._position_object in self._places):
             reply = yield Transfer(self._position_object, attempts=1)
-            if reply.abort in sdo.ABSENT:
+            if isinstance(reply, ObjectRead):
+                self.band.take(reply.number(4, signed=True), channel.now)
+            elif isinstance(reply, Refused) and reply.absent:
                 self._position_object = 0
-            elif reply.data is None:
-                self._mute.add(self._position_object)
             else:
-                self.band.take(int.from_bytes(reply.data[:4], 'little', signed=True), channel.now)
+                self._mute.add(self._position_object)
 
     @property
     def _tells_position(self) -> bool:

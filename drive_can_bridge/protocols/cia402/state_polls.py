@@ -12,13 +12,14 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
-from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.homing import Homing
 from drive_can_bridge.protocols.cia402.node_set_up import NodeSetUp, POLL_PERIOD
 from drive_can_bridge.protocols.cia402.state_machine import DriveRules
 from drive_can_bridge.protocols.cia402.states import MODES, ServoState
-from drive_can_bridge.protocols.cia402.transactor import Procedure, SdoChannel, Transfer
+from drive_can_bridge.protocols.cia402.transactor import (
+    ObjectRead, Procedure, SdoChannel, Transfer)
+from drive_can_bridge.protocols.transactor import Refused
 
 
 class StatePolls:
@@ -70,11 +71,11 @@ class StatePolls:
         """Read 6061h until it shows the mode."""
         while self._rules.state is ServoState.OPERATION_ENABLED:
             reply = yield Transfer(states.MODE_SHOWN)
-            if reply.abort in sdo.ABSENT:
+            if isinstance(reply, Refused) and reply.absent:
                 self._node_set_up.tell(sentences.mode_not_shown())
                 self._mode_shown = self._mode       # nothing says otherwise
-            elif reply.data:
-                self._mode_shown = int.from_bytes(reply.data[:1], 'little', signed=True)
+            elif isinstance(reply, ObjectRead) and reply.content:
+                self._mode_shown = reply.number(1, signed=True)
             if self._mode_shown == self._mode:
                 if not self._control.stopping:      # the status is older than what was sent
                     self._control.status_received(self._rules.status, self._channel.now)
@@ -91,7 +92,7 @@ class StatePolls:
     def _look_at_error(self) -> Procedure[None]:
         """Read 603Fh: why the drive is not enabled."""
         reply = yield Transfer(states.ERROR_CODE)
-        self._error_code = -1 if reply.data is None else int.from_bytes(reply.data[:2], 'little')
+        self._error_code = reply.number(2) if isinstance(reply, ObjectRead) else -1
 
     @property
     def mode_lacking(self) -> Sentence:

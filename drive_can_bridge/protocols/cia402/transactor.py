@@ -9,7 +9,7 @@ object could be mistaken for that to another one.
 from collections.abc import Callable, Generator, Hashable
 from dataclasses import dataclass
 import math
-from typing import NamedTuple
+from typing import Union
 
 from drive_can_bridge.core import frame_sentences, sentences
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
@@ -21,7 +21,8 @@ from drive_can_bridge.protocols.canopen.sdo import SdoCommand, SdoMessage
 from drive_can_bridge.protocols.channel import Channel, LATE_MAX, STOP_PATIENCE
 from drive_can_bridge.protocols.cia402.states import STATUS_WORD
 from drive_can_bridge.protocols.telegrams import Direction
-from drive_can_bridge.protocols.transactor import ResultT, Transactor
+from drive_can_bridge.protocols.transactor import (
+    Answered, NOT_TAKEN, Refused, ResultT, Silence, SILENT, Transactor)
 
 #: what every node has: device type, error register, identity; a refusal will do, too
 ASIDE = (0x1000, 0), (0x1001, 0), (0x1018, 0), (0x1018, 1)
@@ -51,23 +52,23 @@ class Transfer:
     again: bool = False
 
 
-class TransferResult(NamedTuple):
+@dataclass(frozen=True)
+class ObjectRead(Answered[bytes]):
     """
-    What became of a transfer.
+    What was read; nothing after a write.
 
-    :param data: what was read; empty after a write; None: nobody answered, or a refusal.
-    :param abort: the code of a refusal.
-    :param sent: False for a write that the bus refused.
     :param sized: the drive has told how long the object is.
     :param padded: the drive answers with four bytes whatever the size, its status word, too; None:
         that has not been asked for yet.
     """
 
-    data: bytes | None = None
-    abort: int | None = None
-    sent: bool = True
+    content: bytes = b''
     sized: bool = True
     padded: bool | None = None
+
+    def number(self, length: int | None = None, *, signed: bool = False) -> int:
+        """Return the first bytes, or all, as a number."""
+        return int.from_bytes(self.content[:length], 'little', signed=signed)
 
     def word(self, length: int, *, signed: bool) -> int | None:
         """
@@ -76,10 +77,7 @@ class TransferResult(NamedTuple):
         More bytes are taken of a drive only that fills all up to four, where those are 00 or, of
         what is signed, the sign.
         """
-        data = self.data
-        if data is None:
-            return None
-        content, rest = data[:length], data[length:] if self.sized else b''
+        content, rest = self.content[:length], self.content[length:] if self.sized else b''
         sign = b'\xFF' if signed and content and content[-1] & 0x80 else b'\0'
         if len(content) < length or rest and not (
                 self.padded and set(rest) in ({0}, set(sign))):
@@ -87,10 +85,10 @@ class TransferResult(NamedTuple):
         return int.from_bytes(content, 'little')
 
 
-SILENT, NOT_SENT, DONE = TransferResult(), TransferResult(sent=False), TransferResult(b'')
+Reply = Union[ObjectRead, Refused, Silence]
 
 
-class SdoTransactor(Transactor[Transfer, TransferResult]):
+class SdoTransactor(Transactor[Transfer, Reply]):
     """
     Does one transfer at a time.
 
@@ -119,7 +117,7 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
     def begin(self, step: Transfer, now: float) -> None:
         self._collected = None
         if step.pause:
-            self.silent = DONE
+            self.silent = ObjectRead()
             self.expect(step, now + step.pause)
             return
         self.silent = SILENT
@@ -129,7 +127,7 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
             if step.data is None:
                 return      # a read that the bus refused is repeated when its time is over
             if not sent:
-                self.end(step, NOT_SENT, then)
+                self.end(step, NOT_TAKEN, then)
             elif (step.index, step.subindex) in self._places:
                 self._sent.take((int.from_bytes(step.data, 'little'),),
                                 self._places[step.index, step.subindex])
@@ -139,7 +137,7 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
             else sdo.encode_download(self._node, step.index, step.subindex, step.data)
         self._outbox.put(frame, left)
 
-    def receive(self, answer: bytes, now: float) -> TransferResult | bool:
+    def receive(self, answer: bytes, now: float) -> Reply | bool:
         found, step = self.decode(answer), self.step
         if found.kind is SdoCommand.SEGMENT:
             return self._take_segment(found, now)
@@ -157,10 +155,10 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
             return self._ask_segment(now)
         self.finish()
         if found.kind is SdoCommand.ABORT:
-            return TransferResult(abort=found.number)
+            return Refused(found.number, sdo.describe(found.number))
         if found.object == (STATUS_WORD, 0) and found.kind is SdoCommand.UPLOADED and found.last:
             self._padded = len(found.data) > 2
-        return self._answered(found.data, sized=found.last)
+        return ObjectRead(found.data, found.last, self._padded)
 
     def decode(self, answer: bytes) -> SdoMessage:
         """
@@ -178,7 +176,7 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
         """
         return _belongs(sdo.decode(Direction.RESPONSE, answer), step)
 
-    def _take_segment(self, found: SdoMessage, now: float) -> TransferResult | bool:
+    def _take_segment(self, found: SdoMessage, now: float) -> Reply | bool:
         if self._collected is None or found.toggle != self._toggle:
             raise RemoteProtocolError(frame_sentences.sdo_out_of_turn())
         self._collected += found.data
@@ -189,12 +187,9 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
             self._give_up(_TOO_LONG, self.step)     # not the drive's word: what came is the reply
         data = bytes(self._collected)
         self.finish()
-        return self._answered(data, sized=True)
+        return ObjectRead(data, True, self._padded)
 
-    def _answered(self, data: bytes, *, sized: bool) -> TransferResult:
-        return TransferResult(data, sized=sized, padded=self._padded)
-
-    def _ask_segment(self, now: float) -> TransferResult | bool:
+    def _ask_segment(self, now: float) -> Reply | bool:
         if self._abandoned:
             self.forget()
             return SILENT
@@ -208,7 +203,7 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
             self._outbox.put(sdo.request(self._node, SdoMessage(
                 SdoCommand.ABORT, (step.index, step.subindex), number=code)))
 
-    def handle_timer(self, now: float) -> TransferResult | bool:
+    def handle_timer(self, now: float) -> Reply | bool:
         if self._collected is not None and self.busy and now >= self.deadline:
             self._give_up(_TIMED_OUT, self.step)    # the drive waits for the next segment
         return super().handle_timer(now)
@@ -226,9 +221,6 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
         if step.attempts is not None or step.pause:
             return step.attempts or 1
         return self.retry.attempts if step.data is None else 1
-
-    def unanswered(self, step: Transfer, reply: TransferResult) -> bool:
-        return reply is SILENT
 
     def again(self, step: Transfer) -> bool:
         return step.again
@@ -248,9 +240,9 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
         return None if step.pause else (step.index, step.subindex)
 
 
-SdoChannel = Channel[Transfer, TransferResult]
+SdoChannel = Channel[Transfer, Reply]
 #: yields steps, is sent what became of each, and returns something
-Procedure = Generator[Transfer, TransferResult, ResultT]
+Procedure = Generator[Transfer, Reply, ResultT]
 
 
 def _belongs(found: SdoMessage, step: Transfer) -> bool:

@@ -8,7 +8,8 @@ from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, PkwLayout
 from drive_can_bridge.protocols.canopen_pkw.transactor import (
-    Answered, MailboxTransactor, Refused, RegisterRead, RegisterWrite, Reply, Silence)
+    MailboxTransactor, RegisterRead, RegisterWrite, Reply)
+from drive_can_bridge.protocols.transactor import Answered, Refused, Silence
 
 REGISTER = Address(455)
 OBJECT = Address(0x2004, 0x06)
