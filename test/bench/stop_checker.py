@@ -175,7 +175,7 @@ class World:
         sync = sent.identifier == 0x80 and isinstance(self.partners[0].device, ServoDrive)
         self.sync_lost = self.sync_lost or sync and (lost or self.cycles_lost)
         if isinstance(self.partners[0].device, StandardDrive) and not self.control:
-            self.unheard.goes(sent, lost=lost)
+            self.unheard.goes(sent, lost=lost or self.cycles_lost)
         if lost:
             return
         self.hears(sent)

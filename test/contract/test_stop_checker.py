@@ -79,6 +79,11 @@ def test_what_waits_for_sync_in_a_drive_that_was_stopped_starts_nothing(
     assert not broken(kind, (('lossy', 0.013), later), lenient=False)
 
 
+@pytest.mark.parametrize('kind', [kind for kind in KINDS if '11 bit' in kind])
+def test_what_arrives_is_no_answer_to_a_question_that_never_left(kind: str) -> None:
+    assert not broken(kind, (('slow', 0.11), ('refuses', 0.013), ('end', 0.0)))
+
+
 def _nothing(*_: Any, **__: Any) -> None:
     pass
 

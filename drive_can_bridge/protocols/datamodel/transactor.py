@@ -148,6 +148,7 @@ class ParameterTransactor(Transactor[Step, Reply]):
         self._eeprom_free_at = -math.inf
         self._stop_free_at = -math.inf      # for what confirms a stop, or tells it again
         self._stop_wait_until = -math.inf   # for the EEPROM, what tells it first
+        self._refused: ParameterRead | None = None  # by the bus: nothing answers it
         self._first: tuple[ParameterWrite, Left] | None = None
         self._urgent: deque[tuple[ParameterWrite, Left]] = deque()
 
@@ -160,12 +161,17 @@ class ParameterTransactor(Transactor[Step, Reply]):
     @property
     def outstanding(self) -> ParameterRead | None:
         """The read that waits for its answer, if any."""
-        return self.step if isinstance(self.step, ParameterRead) else None
+        step = self.step
+        return step if isinstance(step, ParameterRead) and step is not self._refused else None
 
     def begin(self, step: Step, now: float) -> None:
         if isinstance(step, ParameterRead):
-            self._emit(self._codec.encode_read(step.number, step.count), None)
-            self.asked_at = now
+            def left(sent: bool, _: float) -> None:
+                # where answers say what they answer, a late one is as good
+                if not sent and self.anonymous:
+                    self._refused = step
+            self._refused, self.asked_at = None, now
+            self._emit(self._codec.encode_read(step.number, step.count), left)
             self.expect(step, now + (
                 self.retry.timeout if step.timeout is None else step.timeout))
             return
@@ -291,7 +297,8 @@ class ParameterTransactor(Transactor[Step, Reply]):
                 return self.free_at
             return max(self.free_at, min(self._eeprom_free_at, self._stop_wait_until))
         # nobody answers writes: where reads take up all the time, they need not wait for answers
-        if self._first is None or self.busy and not (self.anonymous and self.outstanding):
+        if self._first is None or self.busy and not (
+                self.anonymous and isinstance(self.step, ParameterRead)):
             return math.inf
         ready = max(held_until, self.free_at)
         return max(ready, self._eeprom_free_at) if self._first[0].eeprom else ready
