@@ -10,6 +10,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 import difflib
 import inspect
+from itertools import groupby
 from pathlib import Path
 import re
 from string import Formatter
@@ -83,8 +84,19 @@ def define(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Show the rows of a code (one of drives, one of files, or both), or those of a text."""
-    text = ' '.join(args.code)
+    """Show the rows of codes (one of drives, one of files, or both), or those of texts."""
+    return max([_explain(text, json=args.json)
+                for quoted, words in groupby(args.code, _is_line)
+                for text in (words if quoted else [' '.join(words)])])
+
+
+def _is_line(word: str) -> bool:
+    """Return whether an argument was quoted, and is no list of codes."""
+    return ' ' in word and not _named(word)
+
+
+def _explain(text: str, *, json: bool) -> int:
+    """Show the rows of codes, or those of a text; return the exit code."""
     named, unknown = _named(text), list[str]()
     rows = named or _told(text)
     if not rows:    # a list of codes, of which some are none; mostly other words: a text
@@ -94,7 +106,7 @@ def run(args: Namespace) -> int:
             named = rows = _named(' '.join(word for word in words if word not in unknown))
     shown = rows if named else rows[:_NEAREST]
     for about, row in shown:
-        if args.json:
+        if json:
             print_json({'code': row.code, 'about': about, 'texts': forms(row), 'do': row.do})
         else:
             say(f'{row.code} ({_WHERE[about]})')

@@ -79,6 +79,18 @@ def test_several_codes_are_explained_one_after_the_other(
     assert codes(*words, capsys=capsys) == found
 
 
+def test_lines_and_codes_are_explained_one_after_the_other(
+        capsys: pytest.CaptureFixture[str]) -> None:
+    line = 'lift: enable: bridge inactive'
+    told = [codes(*words, capsys=capsys) for words in (
+        (line,), ('not_armed', 'bus_up'), ('no', 'answer', 'in'))]
+    assert codes(line, 'not_armed', 'bus_up', line, capsys=capsys) == [
+        *told[0], *told[1], *told[0]]
+    assert codes('no', 'answer', 'in', line, capsys=capsys) == told[2] + told[0]
+    assert main(['explain', line, 'nonsense_of_mine']) == 1
+    assert 'nonsense_of_mine: no such code' in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(('word', 'found'), [
     ('file-does_not_fit', [('does_not_fit', FILES)]),
     ('file-read_only', [('read_only', FILES)]),
