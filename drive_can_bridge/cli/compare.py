@@ -207,7 +207,13 @@ def _sides_of(args: Namespace) -> list[Side]:
              or '/' in word}
     wanted = [word for word in words if word not in files]
     if not wanted:
-        profile = next(filter(None, map(_profile_of, files.values())), None)
+        file, profile = next(((word, found) for word in words
+                              if (found := _profile_of(files[word])) is not None), ('', None))
+        made_with = {head.profile_sha256: printable(head.profile)
+                     for head in (files[word].head for word in words)}
+        if len(made_with) > 1 and all(made_with):
+            complain(command_sentences.backups_of_two_profiles(
+                *words, ' and '.join(dict.fromkeys(made_with.values())), file))
         sides = [_file_alone(files[word], profile) for word in words]
     else:
         with source_of(args) as source:

@@ -184,6 +184,12 @@ nothing_in_common = Text(
 backup_of_other_profile = Text(
     'warning: {file} was made with another profile ({profile}) than the one of {drive} ({its})',
     do='see what has changed in the profile')
+backups_of_two_profiles = Text(
+    'warning: {one} and {other} were made with different profiles, or versions of one '
+    '({profiles}); units and names of values are those of {read_by}',
+    'warning: {one} and {other} were made with different profiles, or versions of one '
+    '({profiles}), and neither is here: values are compared without units',
+    do='compare backups of the same kind of drive, made with the same profile')
 no_settings_left_out = Text(
     '{word}: left out, because no settings: {count} values ({names}{more})',
     do='nothing: they are values that only show something')
