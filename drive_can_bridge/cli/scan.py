@@ -454,16 +454,18 @@ def _command(args: Namespace) -> str:
 
 def _show(args: Namespace, scan: BusScan) -> None:
     sightings = scan.sightings
+    drives = _canopen_stations(sightings)
+    others = [(node, text) for node, text in sorted(scan.nodes.items()) if node not in drives]
     if args.json:
+        for node, text in others:
+            complain(command_sentences.node_of_no_family(node=node, text=text))
         print_json(*({'protocol': each.protocol, 'station': each.station,
                       'certainty': each.certainty.value, 'text': each.text}
                      for each in sightings))
         return
-    drives = _canopen_stations(sightings)
     rows = [(each.protocol, str(each.station), each.certainty.value, each.text)
             for each in sightings]
-    rows += [('CANopen node', str(node), '–', text)
-             for node, text in sorted(scan.nodes.items()) if node not in drives]
+    rows += [('CANopen node', str(node), '–', text) for node, text in others]
     if rows:
         print('\n'.join(column_lines(_COLUMNS, rows, numbers=('station',))))
     else:

@@ -261,6 +261,9 @@ bitrate_of_interface = Text(
     'warning: --bitrate {given} does not change the interface: {name} is set to {bitrate} bit/s '
     '(ip link set {name} down, then: ip link set {name} up type can bitrate {given})',
     do='leave --bitrate away, or set the interface to that of the drives')
+node_of_no_family = Text(
+    'CANopen node {node}: {text}: no drive of a known family, as far as was heard',
+    do='leave --passive away to have it asked')
 scan_unacknowledged = Text(
     '{error}: no other node acknowledges',
     do='switch on a drive; check cable, termination and bit rate')

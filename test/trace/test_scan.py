@@ -525,6 +525,15 @@ def test_beside_a_bridge_all_drives_are_found_by_listening(
     assert SAID['master'] in err and SAID['passive'] in err and '500000 bit/s, ' in err
 
 
+def test_a_node_of_no_known_family_is_no_document_and_is_named(
+        bench: World, capsys: pytest.CaptureFixture[str]) -> None:
+    with Simulation(configuration_from_file(config_file('all_families.yaml')), bench.clock):
+        assert drive_can('scan', '--interface', 'virtual', '--channel', 'all_families',
+                         '--passive', '--listen', 3.0, '--json') == 0
+    out, err = capsys.readouterr()
+    assert not out and err.startswith('CANopen node 5: heartbeat ')
+
+
 def test_what_was_not_asked_is_named_with_the_next_command(
         bench: World, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     played = configuration_from_file(config_file('example.yaml'))
