@@ -192,6 +192,21 @@ class FewObjects(ServoDrive):
             self.objects.pop(place, None)
 
 
+class WatchesOnce(ServoDrive):
+    """
+    Refuses an entry of 1016h whose node is watched, also by that entry: it is cleared first.
+
+    embedded-office/canopen-stack 4.4 (f4e4db8). No reset of communication clears it either.
+    """
+
+    def refusal(self, index: int, subindex: int, content: bytes) -> int:
+        if index == 0x1016 and any(
+                entry[2:3] == content[2:3] and entry[:2] != bytes(2) != content[:2]
+                for (number, place), entry in self.objects.items() if number == index and place):
+            return 0x06040043
+        return super().refusal(index, subindex, content)
+
+
 class StartsItself(AcceptsAnything):
     """Operational by itself, at once and without a word: Lely core 2.4.0 (620d185), no 1F80h."""
 

@@ -132,11 +132,17 @@ class BridgeWatch:
         limit = min(round(1000 * WATCH_INTERVALS * interval), 0xFFFF)
         before, self.slot = self.slot, slots[0]   # also where the end comes before the answer
         entry, wanted = entries[slots[0] - 1], node << 16 | limit
+        if entry == wanted:     # of a bridge that died: some stacks refuse what is watched already
+            return self.slot
+        ours = entry >> 16 & 0x7F == node and entry & 0xFFFF > 0
         refusal = yield from self._objects.put(CONSUMER, slots[0], wanted, 4)
+        if refusal and ours and not (yield from self._objects.put(CONSUMER, slots[0], 0, 4)):
+            ours = False
+            refusal = yield from self._objects.put(CONSUMER, slots[0], wanted, 4)
         if refusal:
             self.slot = before
             self._tell(refusal)
-            return slots[0] if entry >> 16 & 0x7F == node and entry & 0xFFFF else None
+            return slots[0] if ours else None
         found = yield from self._objects.read(CONSUMER, slots[0])
         if found not in (None, wanted):     # acknowledged, and not taken
             self._tell(sentences.object_differs(

@@ -7,7 +7,7 @@ from builders import INT16, parameter, write
 import pytest
 from saying import says
 from servo_builders import Axis, FITS, POSITION, TABLE, TORQUE, VELOCITY
-from stacks import EightEntries, SignedLengths
+from stacks import EightEntries, SignedLengths, WatchesOnce
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, MappingDiffered, Noted
@@ -445,6 +445,17 @@ class TestWatches:
     def test_an_entry_of_ours_that_cannot_be_written_watches_all_the_same(self) -> None:
         axis = meet(objects={(0x1016, 1): bytes.fromhex('F4017F00')}, refuses=fixed((0x1016, 1)))
         assert says('nothing_stops') not in notes(axis)
+
+    @pytest.mark.parametrize(('entry', 'written_anew'), [
+        ('58027F00', []), ('2C017F00', ['16100158027F00', '16100100000000', '16100158027F00'])])
+    def test_an_entry_of_a_bridge_that_died(self, entry: str, written_anew: list[str]) -> None:
+        """What it is to be already stays; another time is written behind 0 where it has to be."""
+        axis = meet(objects={(0x1016, 1): bytes.fromhex(entry)}, make=WatchesOnce)
+        assert not notes(axis)
+        assert [text for text in written(axis) if text.startswith('1610')] == written_anew
+        assert axis.drive.number(0x1016, 1) == 0x7F0258
+        axis.ends(1.0)
+        assert axis.drive.number(0x1016, 1) == 0     # so that it does not end in a fault
 
     def test_off(self) -> None:
         axis = meet(bridge_heartbeat=0.0)
