@@ -976,6 +976,9 @@ no_such_type = Text(
     do='send one of the types of rcl_interfaces/msg/ParameterType')
 command_names_lines = Text('{command} names the lines', do='run that command')
 active = Text('active: {drives:#drive} on {buses}', do='nothing')
+shut_down = Text(
+    'shut down: nothing is sent any more; end this process, and start it again to go on',
+    do='end the process, and start it again where drives are to run')
 stop_frames_not_sent = Text(
     'bus {bus}: the stop frames could not all be sent: {reason}',
     do='make sure that its drives stand still, by other means if need be')

@@ -347,6 +347,7 @@ class BridgeNode(LifecycleNode):
         def shut_down() -> None:
             self._stop_drives()
             self._clean_up()
+            self.log.info(sentences.shut_down())
         return self._transition('shutdown', shut_down)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -90,6 +90,7 @@ def test_labels_and_repetition(bridge: StartBridge, client: Client) -> None:
         assert client.state() == state
         if state == 'active':
             one.online()
+    client.wait_logged(sentences.shut_down())
 
 
 def test_inactive_sends_nothing(bridge: StartBridge, client: Client) -> None:
