@@ -272,7 +272,7 @@ class AnyOrder(RuleBasedStateMachine):
     def time_is_lost(self) -> None:
         self.now += 1.0
         self.observer.time_was_lost(self.session)
-        self.session.time_lost(self.now)
+        self.session.handle_stall(self.now)
         self.look()
 
     # -- users ------------------------------------------------------------------------------------

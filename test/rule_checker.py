@@ -82,7 +82,7 @@ class Channel(NamedTuple):
         return self.told and (self.strict or not self.stopped)
 
     @property
-    def owed(self) -> bool:
+    def stop_pending(self) -> bool:
         """It is to be told once more."""
         return self.runs or self.told and self.silent
 
@@ -199,8 +199,8 @@ def _event(duty: StopDuty, channels: list[Channel], what: str) -> list[Channel]:
         _is(duty.happened(Happened.ANSWERED), Do.NOTHING)
         return channels if any(channel.runs for channel in channels) else [
             AT_REST for _ in channels]
-    told, owed = (any(channel.told for channel in channels),
-                  any(channel.owed for channel in channels))
+    told, stop_pending = (any(channel.told for channel in channels),
+                  any(channel.stop_pending for channel in channels))
     if what == 'silent':
         _is(duty.happened(Happened.SILENT), Do.NOTHING)
         return _silent(channels)
@@ -210,7 +210,7 @@ def _event(duty: StopDuty, channels: list[Channel], what: str) -> list[Channel]:
         return _unanswered(duty, channels)
     elif what in ('starts', 'ends'):
         _is(duty.happened(Happened.STARTED if what == 'starts' else Happened.ENDS),
-            Do.STOP if owed else Do.NOTHING)
+            Do.STOP if stop_pending else Do.NOTHING)
     elif what == 'shows up':
         _is(duty.happened(Happened.SHOWED_UP), Do.STOP_BY_NUMBER if told else Do.NOTHING)
         return _silent(channels)
@@ -219,7 +219,7 @@ def _event(duty: StopDuty, channels: list[Channel], what: str) -> list[Channel]:
         _is(duty.happened(Happened.MAPS_DIFFER),
             Do.STOP_BY_NUMBER if unheard else Do.STOP if told else Do.NOTHING)
     elif what == 'given up':        # whoever leaves so has waited for an answer
-        _is(duty.happened(Happened.LEFT_ALONE), Do.WARN if owed else Do.NOTHING)
+        _is(duty.happened(Happened.LEFT_ALONE), Do.WARN if stop_pending else Do.NOTHING)
     elif what == 'bus lost':
         return _bus_lost(duty, channels)
     else:       # whoever runs on was named, and is nothing of the next activation
@@ -231,9 +231,9 @@ def _event(duty: StopDuty, channels: list[Channel], what: str) -> list[Channel]:
 def _unanswered(duty: StopDuty, channels: list[Channel]) -> list[Channel]:
     fresh = not any(channel.runs for channel in channels) and any(
         channel.told and not channel.silent for channel in channels)
-    owed = any(channel.owed for channel in channels)
+    stop_pending = any(channel.stop_pending for channel in channels)
     _is(duty.happened(Happened.UNANSWERED),
-        Do.STOP_BY_NUMBER if fresh else Do.STOP if owed else Do.NOTHING)
+        Do.STOP_BY_NUMBER if fresh else Do.STOP if stop_pending else Do.NOTHING)
     return _silent(channels) if fresh else channels
 
 
@@ -242,7 +242,7 @@ def _bus_lost(duty: StopDuty, channels: list[Channel]) -> list[Channel]:
     _is(duty.happened(Happened.SILENT), Do.NOTHING)
     channels = _silent(channels)
     do = duty.happened(Happened.LEFT_ALONE)
-    _is(do, Do.WARN if any(channel.owed for channel in channels) else Do.NOTHING)
+    _is(do, Do.WARN if any(channel.stop_pending for channel in channels) else Do.NOTHING)
     if do is not Do.WARN and any(channel.turns for channel in channels):
         raise Violation('a motor that runs on is not named')
     return channels
@@ -263,10 +263,11 @@ def _judge(duty: StopDuty, channels: Sequence[Channel]) -> None:
         raise Violation('a motor runs, and nobody knows')
     if duty.may_run and not any(channel.told for channel in channels):
         raise Violation('nothing was told to run, and something is owed')
-    if duty.owed is not any(channel.owed for channel in channels):
-        raise Violation('a stop is owed' if duty.owed else 'no stop is owed')
-    if duty.unshown is not any(channel.told and not channel.strict for channel in channels):
-        raise Violation('a stop is to be shown' if duty.unshown else 'no stop is to be shown')
+    if duty.stop_pending is not any(channel.stop_pending for channel in channels):
+        raise Violation('a stop is owed' if duty.stop_pending else 'no stop is owed')
+    if duty.unacknowledged is not any(channel.told and not channel.strict for channel in channels):
+        raise Violation(
+            'a stop is to be shown' if duty.unacknowledged else 'no stop is to be shown')
 
 
 # -- changed tables -------------------------------------------------------------------------------

@@ -138,7 +138,7 @@ class ToySession(Session):
         self.services = DriveServices(self, ToyAccess(self._channel, self.retry, OneByOne()))
         self._answers = CycleAnswers(self, silence='no sample')
         self._exchange: CyclicExchange[bytes] = CyclicExchange(self._answers, self, slot=0)
-        self.look_after(self._exchange, channel=self._channel)
+        self.set_parts(self._exchange, channel=self._channel)
 
     def begin(self, now: float) -> None:
         self._exchange.stop()
@@ -215,9 +215,9 @@ class ToyObserver(DriveObserver):
                 (CYCLE, Direction.REQUEST, drive.cyclic_request),
                 (SAMPLE, Direction.RESPONSE, drive.cyclic_response)):
             self.handlers[base + drive.station] = partial(self._take_words, direction, listed)
-        self.hear(TASK + drive.station, Direction.REQUEST, TelegramKind.PARAMETER, 'task',
+        self.listen(TASK + drive.station, Direction.REQUEST, TelegramKind.PARAMETER, 'task',
                   decode_task, self._take_task)
-        self.hear(REPLY + drive.station, Direction.RESPONSE, TelegramKind.PARAMETER, 'answer',
+        self.listen(REPLY + drive.station, Direction.RESPONSE, TelegramKind.PARAMETER, 'answer',
                   decode_task, self._take_reply)
 
     def _take_words(self, direction: Direction, listed: Sequence[Parameter], data: bytes,
@@ -225,10 +225,10 @@ class ToyObserver(DriveObserver):
         raws = raws_of(listed, decode_words(data))
         if direction is Direction.REQUEST:
             self._cycle.ask(now)
-            self.tell(now, direction, TelegramKind.CYCLIC, 'cyclic request', listed, raws)
+            self.report(now, direction, TelegramKind.CYCLIC, 'cyclic request', listed, raws)
         else:
             verdict, latency = self._cycle.answer(now)
-            self.tell(now, direction, TelegramKind.CYCLIC, 'cyclic response', listed, raws,
+            self.report(now, direction, TelegramKind.CYCLIC, 'cyclic response', listed, raws,
                       verdict=verdict, latency=latency)
 
     def _take_task(self, task: Task, now: float) -> None:
@@ -256,15 +256,15 @@ class ToyScanner(Scanner):
         self._questions += [encode_task(TASK, station, Task(READ, 1))
                             for station in range(1, STATION_MAX + 1)]
 
-    def hear(self, frame: Frame, now: float) -> None:
+    def receive(self, frame: Frame, now: float) -> None:
         station = frame.identifier & 0x0F
         if frame.identifier - station == TASK:
             self._request(station, frame.data, now)
         elif frame.identifier - station == REPLY:
             self._answer(station, 'answers', now, certainty=Certainty.CERTAIN)
 
-    def hear_request(self, frame: Frame, now: float) -> None:
-        self.hear(frame, now)
+    def receive_request(self, frame: Frame, now: float) -> None:
+        self.receive(frame, now)
 
     def settings(self, station: int) -> dict[str, Any]:
         return {'response_numbers': [1], 'volume': 4}

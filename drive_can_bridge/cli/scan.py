@@ -155,7 +155,7 @@ class BusScan:
         self.frames += 1
         now = self._clock() - self._port.age
         for scanner in self.scanners.values():
-            scanner.hear(frame, now)
+            scanner.receive(frame, now)
 
 
 _HEAD = """\

@@ -376,7 +376,7 @@ class DirectDrive(Drive):
     # -- state ------------------------------------------------------------------------------------
 
     def enabled(self) -> Enabled:
-        told = self._family.tells_enabled(self._drive)
+        told = self._family.enabled_status(self._drive)
         if told is None:
             return Enabled.UNKNOWN
         status, is_enabled = told

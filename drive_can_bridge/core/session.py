@@ -21,7 +21,7 @@ then, how a stop begins and what is reported when it was not acknowledged, which
 family fills in what the exchange of its drives is: :meth:`Session.begin`,
 :meth:`Session.begin_stop`, frames, and a few occasions to act (below "what a family may add").
 What goes on beside that stands in the parts that a session is put together from
-(:meth:`Session.look_after`).
+(:meth:`Session.set_parts`).
 """
 
 from abc import ABC, abstractmethod
@@ -78,7 +78,7 @@ class AcyclicPart(Timed, Protocol):
     def advance(self, now: float) -> None:
         """Do everything that is possible now."""
 
-    def time_lost(self, now: float) -> None:
+    def handle_stall(self, now: float) -> None:
         """Record that the process was stalled until now."""
 
     def clear(self) -> None:
@@ -173,7 +173,7 @@ class Session(ABC):
         self._parts: Sequence[Part] = ()
         self._timed: list[tuple[Timed, Callable[[float], None]]] = []
 
-    def look_after(self, *parts: Part, channel: AcyclicPart,
+    def set_parts(self, *parts: Part, channel: AcyclicPart,
                    behind_control: Sequence[Part] = ()) -> None:
         """
         Set the parts, in the order in which they act.
@@ -184,7 +184,7 @@ class Session(ABC):
         self._parts, self._acyclic = (*parts, *behind_control), channel
         self._timed = [(part, part.handle_timer) for part in parts]
         if self.control is not None:
-            self._timed.append((self.control, self._look_after_control))
+            self._timed.append((self.control, self._handle_control_timer))
         else:
             self._timed.append((self.neutral_stop, self.neutral_stop.handle_timer))
         self._timed += [(part, part.handle_timer) for part in behind_control]
@@ -217,7 +217,7 @@ class Session(ABC):
         self.activated = False
         # left alone after an internal error, and its stop not acknowledged: this one may arrive
         if self.defect and self.stopped and self.bus_available and any(
-                each.owed for each in (self, *self.partners)):
+                each.stop_pending for each in (self, *self.partners)):
             self.stage = Stage.RUNNING
         self._begin_end(sentences.bridge_inactive(), now)
 
@@ -225,7 +225,7 @@ class Session(ABC):
         """
         Stop the drive after an internal error: the state of the session cannot be trusted.
 
-        It is offline from now on, and left alone until :meth:`begin_anew`.
+        It is offline from now on, and left alone until :meth:`recover`.
 
         :param reason: in words.
         """
@@ -234,7 +234,7 @@ class Session(ABC):
         self.defect = reason
         self._begin_end(reason, now)
 
-    def begin_anew(self, now: float) -> None:
+    def recover(self, now: float) -> None:
         """Look for the drive again, after an internal error."""
         self.defect = NOTHING
         self.active = True
@@ -284,12 +284,12 @@ class Session(ABC):
         self.bus_available = True
         if self.active and not self.serving:
             self.report.guess(sentences.looked_for())
-            self.start_over(now)
+            self.restart(now)
 
     def bus_down(self, now: float, reason: str) -> None:
         """Handle the loss of the bus: requests fail, the drive is offline."""
         self.bus_available = False
-        if self.unshown or not (self.active or self.stopped):
+        if self.unacknowledged or not (self.active or self.stopped):
             self.duty.happened(Happened.SILENT)     # no answer to the stop will come
         self.services.fail_all(Failure(FailureKind.UNAVAILABLE, sentences.bus_down()))
         down = sentences.bus_is_down(self.configuration.bus, reason)
@@ -315,14 +315,14 @@ class Session(ABC):
         self.fall_silent()
         self.be_offline(lost or sentences.deactivated(), ordered=not lost)
 
-    def time_lost(self, now: float) -> None:
+    def handle_stall(self, now: float) -> None:
         """Handle a stall of the process: nothing late is sent, setpoints must be armed again."""
-        self._acyclic.time_lost(now)
+        self._acyclic.handle_stall(now)
         if self.stage is Stage.RUNNING:
-            self.stood_still(now)
-            self.start_over(now)
+            self.lose_after_stall(now)
+            self.restart(now)
 
-    def start_over(self, now: float) -> None:
+    def restart(self, now: float) -> None:
         """Restart the exchange: the state of the drive is unknown."""
         reason = sentences.reconnected()
         if self.online:
@@ -343,7 +343,7 @@ class Session(ABC):
         self.be_offline(reason)
         self.lost(now, was_online=was_online)
 
-    def stood_still(self, now: float) -> None:
+    def lose_after_stall(self, now: float) -> None:
         """Set the drive offline after a stall: nothing was exchanged meanwhile."""
         self.lose(sentences.bridge_stood_still(), now)
 
@@ -416,7 +416,7 @@ class Session(ABC):
 
     def withdrawn(self, now: float) -> None:
         """Record that the control word is ``disable`` again."""
-        self.see_to_control_word(now)
+        self.update_control_word(now)
 
     def hand_out_neutral(self, now: float) -> None:  # noqa: B027  where there may be no control
         """Send all setpoints at once, neutral as they are: a drive without a control word."""
@@ -448,7 +448,7 @@ class Session(ABC):
         """Start homing; answered by exactly one ``ControlCompleted``."""
         raise NotImplementedError   # only called where ``homes`` is true
 
-    def see_to_control_word(self, now: float) -> None:  # noqa: B027  optional
+    def update_control_word(self, now: float) -> None:  # noqa: B027  optional
         """Send a control word that has changed."""
 
     # -- traffic ----------------------------------------------------------------------------------
@@ -477,7 +477,7 @@ class Session(ABC):
                 soonest = at
         return soonest
 
-    def _look_after_control(self, now: float) -> None:
+    def _handle_control_timer(self, now: float) -> None:
         if self.control is not None:
             self.control.handle_timer(now)
             self.control_changed(now)
@@ -505,7 +505,7 @@ class Session(ABC):
     def control_changed(self, now: float) -> None:
         """Handle a control word, or a state, that may have changed."""
         self.interlock.follow()
-        self.see_to_control_word(now)
+        self.update_control_word(now)
 
     def reconfigure(self, *, command_timeout: float | None = None,
                     rearm_immediate: bool | None = None,
@@ -564,14 +564,14 @@ class Session(ABC):
         return self.duty.may_run
 
     @property
-    def owed(self) -> bool:
+    def stop_pending(self) -> bool:
         """Whether the drive was commanded to run, and since then to stop only in vain."""
-        return self.duty.owed
+        return self.duty.stop_pending
 
     @property
-    def unshown(self) -> bool:
+    def unacknowledged(self) -> bool:
         """Whether the drive was commanded to run, and has not acknowledged its stop."""
-        return self.duty.unshown
+        return self.duty.unacknowledged
 
     @property
     def offline_advice(self) -> Sentence:

@@ -180,17 +180,18 @@ class StopDuty:
     """
     The pending stops of one drive, channel by channel: the only place where they are kept.
 
-    :ivar owed: it was commanded to run by at least one channel, and to stop since only in vain.
-    :ivar unshown: a channel without acknowledgements commanded it to run, and nothing shows that
-        its stop has arrived.
+    :ivar stop_pending: it was commanded to run by at least one channel, and to stop since only in
+        vain.
+    :ivar unacknowledged: a channel without acknowledgements commanded it to run, and nothing shows
+        that its stop has arrived.
     """
 
-    __slots__ = ('_debts', '_rules', 'owed', 'unshown')
+    __slots__ = ('_debts', '_rules', 'stop_pending', 'unacknowledged')
 
     def __init__(self, rules: dict[tuple[Debt, Happened], Rule] = RULES) -> None:
         self._rules = rules
         self._debts: dict[Hashable, Debt] = {}      # channels with a pending stop
-        self.owed = self.unshown = False
+        self.stop_pending = self.unacknowledged = False
 
     @property
     def may_run(self) -> bool:
@@ -238,5 +239,5 @@ class StopDuty:
 
     def _look(self) -> None:
         debts = self._debts.values()
-        self.owed = any(debt in OWING for debt in debts)
-        self.unshown = any(debt in UNSHOWN for debt in debts)
+        self.stop_pending = any(debt in OWING for debt in debts)
+        self.unacknowledged = any(debt in UNSHOWN for debt in debts)

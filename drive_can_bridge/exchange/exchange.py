@@ -298,7 +298,7 @@ class BusExchange:
         for member in self._members:
             member.anew_at = math.inf
             if lost:
-                member.take(member.session.time_lost, now)
+                member.take(member.session.handle_stall, now)
             member.take(member.session.deactivate, now)
 
     def _wait_for_stop(self) -> bool:
@@ -482,7 +482,7 @@ class BusExchange:
                 now = self._look_at_clock()  # and so did these
                 member.take(member.session.handle_timer, now)
             if member.anew_at <= now:
-                member.begin_anew(now)
+                member.recover(now)
         for member in self._members:  # a partner's timer may have changed after its turn
             due = member.look_at if member.look_at < member.due and self.active else member.due
             if due < soonest:
@@ -520,7 +520,7 @@ class BusExchange:
         for member in self._members:
             member.tell(member.listener.discard_commands,
                         sentences.stood_still_for(seconds=gap))
-            member.take(member.session.time_lost, now)
+            member.take(member.session.handle_stall, now)
         return True
 
     # -- the reader thread (LinkListener) ---------------------------------------------------------

@@ -232,12 +232,12 @@ class Member:
         self.anew_at, self._defect_told = math.inf, ''
         self.take(step, now)
 
-    def begin_anew(self, now: float) -> None:
+    def recover(self, now: float) -> None:
         """Look for the drive again, as soon as its stop is complete."""
         session = self.session
         if session.stopped:
             self.take_commands(now)     # of a drive that is lost: they move nothing
-            self.begin(session.begin_anew, now)
+            self.begin(session.recover, now)
         elif now >= self._give_up_at:
             self.take(session.give_up, now)
 

@@ -115,7 +115,7 @@ class AcyclicOutput:
         """Record that nothing is known of the drive: everything is due at the next look."""
         self.write_all()
         self._due.clear()
-        self.start_over()
+        self.restart()
         self.forget_word()
 
     def forget_word(self) -> None:
@@ -128,7 +128,7 @@ class AcyclicOutput:
 
     # -- what is due ------------------------------------------------------------------------------
 
-    def look(self, raws: Sequence[int], now: float, *, hold: Sequence[int | None] = (),
+    def collect_due(self, raws: Sequence[int], now: float, *, hold: Sequence[int | None] = (),
              unknown: Sequence[int] = ()) -> None:
         """
         Find out what is due, once a period.
@@ -152,7 +152,7 @@ class AcyclicOutput:
         return (raw != self._written[index]
                 or 0.0 < self._refresh[index] <= now - self._written_at[index] + TOLERANCE)
 
-    def told(self, index: int) -> int | None:
+    def last_written(self, index: int) -> int | None:
         """Return what the drive has, or has been sent; None: nobody knows."""
         return self._written[index]
 
@@ -184,7 +184,7 @@ class AcyclicOutput:
         """Record that nobody knows what the drive has: it is due at the next look."""
         self._written[index] = None
 
-    def doubt(self, since: float, *, but: Container[int | None] = ()) -> bool:
+    def invalidate(self, since: float, *, but: Container[int | None] = ()) -> bool:
         """Mark what was written since then, ``but`` these, as due; return if there was any."""
         found = [index for index, at in enumerate(self._written_at)
                  if at > since and index not in but]
@@ -217,7 +217,7 @@ class AcyclicOutput:
                 self.failed(index)
         return bool(self._lacking)
 
-    def start_over(self) -> None:
+    def restart(self) -> None:
         """Forget what was written: whether the drive was there to hear it, nobody knows."""
         self._lacking = None
 

@@ -27,9 +27,9 @@ class CycleAnswers:
     :param period_max: the longest period that is allowed for this drive.
     :ivar session: of the drive.
     :ivar book: counts the cycles, and the answers.
-    :ivar slack: says what would have held.
+    :ivar timing: says what would have held.
     :ivar due: when the answer counts as missed; infinity: with the next cycle, or there is none.
-    :ivar heeded: an answer to a cycle shows that what the drive was told by it has arrived.
+    :ivar confirms: an answer to a cycle shows that what the drive was told by it has arrived.
     """
 
     def __init__(self, session: Session, *, silence: str, advice: str = '',
@@ -38,7 +38,7 @@ class CycleAnswers:
         self.session = session
         self.timing = TimingAdvice(session.configuration, session.report, period_max)
         self.book = ExchangeBook(session.configuration, session.statistics, timer)
-        self.heeded = True
+        self.confirms = True
         self._silent = sentences.silent(silence, advice)
         self.in_turn = in_turn
         self.due = math.inf
@@ -77,7 +77,7 @@ class CycleAnswers:
                 sentences.unasked(what), late, now, would_hold=self._would_hold)
         if self.timing.since < math.inf:
             self.timing.came(received_at)
-        self._heed()
+        self._confirm_stop()
         return False
 
     def answered(self, received_at: float) -> None:
@@ -85,13 +85,13 @@ class CycleAnswers:
         book = self.book
         missed = not book.awaiting
         book.answered(received_at)
-        book.heard(received_at)
+        book.answer_received(received_at)
         if self.timing.since < math.inf:
             self.timing.came(received_at)
         if missed:
             self.session.report.unasked(
                 NOTHING, book.overdue, received_at, would_hold=self._would_hold, taken=True)
-        self._heed()
+        self._confirm_stop()
 
     def _would_hold(self, late: float) -> Sentence:
         return self.timing.late(late) if self.session.online else NOTHING
@@ -108,10 +108,10 @@ class CycleAnswers:
         return book.awaiting or book.outstanding and (
             self.in_turn or self.session.stage is Stage.STOPPING)
 
-    def _heed(self) -> None:
+    def _confirm_stop(self) -> None:
         """Record that the drive has shown to have heard what it was told last, if it has."""
         duty = self.session.duty
-        if self.heeded and self.book.stop_shown:
+        if self.confirms and self.book.stop_shown:
             if self.session.online:
                 duty.happened(Happened.ANSWERED)
             else:       # what else it was told while it was silent, it may have missed

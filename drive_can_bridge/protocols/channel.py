@@ -97,8 +97,8 @@ class Quarantine:
 
         :param late: s since it was time to ask.
         """
-        until, unheard = self._until.get(key, (-math.inf, False))
-        if not unheard:
+        until, unlistened = self._until.get(key, (-math.inf, False))
+        if not unlistened:
             return False
         if late <= PUNCTUAL:
             self._until[key] = until, False
@@ -110,14 +110,14 @@ class Quarantine:
         """Record that no answer to the question comes any more."""
         self._begun = deque((each for each in self._begun if each[1] != key), maxlen=REMEMBERED)
 
-    def time_lost(self, before: float, now: float) -> None:
+    def handle_stall(self, before: float, now: float) -> None:
         """Listen on where nobody did at the end of a quarantine, or while answers may come."""
         self._begun = deque((
             (max(until, now) if before < until + LATE_MAX else until, key)
             for until, key in self._begun), maxlen=REMEMBERED)
-        for key, (until, unheard) in self._until.items():
-            if unheard:
-                self._until[key] = max(until, now + CATCHING_UP), unheard
+        for key, (until, unlistened) in self._until.items():
+            if unlistened:
+                self._until[key] = max(until, now + CATCHING_UP), unlistened
 
     def _forget(self, now: float) -> None:
         """Forget quarantines that have ended long ago, or else the oldest."""
@@ -210,7 +210,7 @@ class Channel(Generic[StepT, ReplyT]):
         self._users_next = False
         self._serving: _Queue[StepT, ReplyT] | None = None  # whose step is under way
         self._hurried = False  # and it has to make room
-        self._doubtful = 0  # so many answers to a stop may be late ones to what was asked before
+        self._late_answers = 0  # so many answers to a stop may be to what was asked before
         self._deadline = math.inf  # of the exchange under way, as it was at first
         self._quarantine = Quarantine()
         #: what was given up without an answer, and when
@@ -236,11 +236,11 @@ class Channel(Generic[StepT, ReplyT]):
                 return max(0.0, received_at - at)
         return None
 
-    def doubtful(self, step: StepT) -> int:
+    def late_answers(self, step: StepT) -> int:
         """Return how many late answers may be taken for that to a step of a stop."""
         transactor = self._transactor
         return 0 if transactor.anonymous else (
-            self._quarantine.late(transactor.doubted(step), self.now))
+            self._quarantine.late(transactor.late_key(step), self.now))
 
     # -- queueing ---------------------------------------------------------------------------------
 
@@ -321,12 +321,12 @@ class Channel(Generic[StepT, ReplyT]):
         self.now = now
         step = None if self._serving is None else self._serving.step
         if step is not None:
-            self._quarantine.answered(self._transactor.doubted(step))
-        if self._serving is self._stop and self._doubtful:
-            self._doubtful -= 1
+            self._quarantine.answered(self._transactor.late_key(step))
+        if self._serving is self._stop and self._late_answers:
+            self._late_answers -= 1
             self._hurried, reply = True, self._transactor.silent
-            if self._doubtful and step is not None:
-                self._ask_aside(self._transactor.doubted(step))
+            if self._late_answers and step is not None:
+                self._ask_aside(self._transactor.late_key(step))
         self._end(reply)
         self.advance(now)
         return True
@@ -340,13 +340,13 @@ class Channel(Generic[StepT, ReplyT]):
         self._awake = True
         self.advance(now)
 
-    def time_lost(self, now: float) -> None:
+    def handle_stall(self, now: float) -> None:
         """Record that nobody listened until now: an answer may lie in some buffer."""
-        self._quarantine.time_lost(self.now, now)
+        self._quarantine.handle_stall(self.now, now)
         self.now = now
         if self._transactor.busy:
             self._deadline = max(self._deadline, now)
-            reply = self._transactor.time_lost(now)
+            reply = self._transactor.handle_stall(now)
             if reply is not False:
                 self._end(reply)  # type: ignore[arg-type]  # True is never returned
 
@@ -410,7 +410,7 @@ class Channel(Generic[StepT, ReplyT]):
                 self._quarantine.holds(key, now, now - ready_at)):
             return False
         if queue is self._stop and not queue.repeated:
-            self._doubtful = self.doubtful(step)
+            self._late_answers = self.late_answers(step)
         self._serving = queue
         queue.attempts_left -= 1
         transactor.begin(step, now)
@@ -469,7 +469,7 @@ class Channel(Generic[StepT, ReplyT]):
         key = self._key(queue, queue.step)
         return key is not None and self._quarantine.ready_at(key) > self.now
 
-    def _ask_aside(self, doubted: Hashable) -> None:
+    def _ask_aside(self, late_key: Hashable) -> None:
         """Ask something between two attempts at a stop, to learn that nothing older comes."""
         transactor = self._transactor
         step = transactor.aside(lambda key: self._quarantine.late(key, self.now) > 0)
@@ -479,8 +479,8 @@ class Channel(Generic[StepT, ReplyT]):
         def asking() -> Generator[StepT, ReplyT, None]:
             reply = yield step
             if not transactor.unanswered(step, reply):
-                self._doubtful = 0
-                self._quarantine.over(doubted)
+                self._late_answers = 0
+                self._quarantine.over(late_key)
         self._aside.waiting.append((asking(), lambda _: None))
         self._aside.fetch()
 

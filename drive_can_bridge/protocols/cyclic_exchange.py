@@ -117,7 +117,7 @@ class CyclicExchange(Generic[TelegramT]):
         return self._cycle is not None and self._cycle.runs
 
     @property
-    def insisting(self) -> bool:
+    def sending_more(self) -> bool:
         """The last cycles are more than a drive gets that answers."""
         return self._ending in (Ending.MORE, Ending.WAITING_LONGER)
 
@@ -157,7 +157,7 @@ class CyclicExchange(Generic[TelegramT]):
                 timer.no_later(max(now, timer.began_at + EXPIRY_SPACING))
             return
         if self._ending and self._waiting:
-            self._insist(now)
+            self._send_more(now)
             if now < timer.due:     # that was all
                 return
         if not answers.in_turn or now >= answers.due:
@@ -223,7 +223,7 @@ class CyclicExchange(Generic[TelegramT]):
 
     def hand_out_neutral(self, now: float) -> None:
         """Bring the next cycle forward: only its answer shows that the drive was told to stop."""
-        self._answers.book.doubt()
+        self._answers.book.invalidate()
         self.timer.hurry(now)
 
     # -- sending ----------------------------------------------------------------------------------
@@ -279,7 +279,7 @@ class CyclicExchange(Generic[TelegramT]):
             self._whole = False
         elif runs:
             for each in to:
-                each.book.doubt()   # also of those who are not asked by it
+                each.book.invalidate()   # also of those who are not asked by it
                 each.session.duty.channel(CYCLE, Happened.RUN_LEFT)
         if self._frames_out or not self._whole:
             return
@@ -319,7 +319,7 @@ class CyclicExchange(Generic[TelegramT]):
         else:   # those of a stop before this one have left, what goes by writes is under way
             self.run_out(soon)
         self._ending = Ending.LAST
-        self._answers.book.doubt()      # one of these is to be answered
+        self._answers.book.invalidate()      # one of these is to be answered
         self.timer.hurry(now)
 
     def run_out(self, first: float) -> None:
@@ -332,15 +332,15 @@ class CyclicExchange(Generic[TelegramT]):
 
     def _last_left(self, now: float) -> None:
         """Come to an end, at once or when somebody has answered."""
-        if self._ending and self._unheard:
-            self._ending = Ending.WAITING_LONGER if self.insisting else Ending.WAITING
+        if self._ending and self._unacknowledged:
+            self._ending = Ending.WAITING_LONGER if self.sending_more else Ending.WAITING
             self.timer.start(now + LAST_ANSWER)
         else:
             self._sender.last_cycle_left(now)
 
-    def _insist(self, now: float) -> None:
+    def _send_more(self, now: float) -> None:
         """Send more cycles to those that have not acknowledged one; end it, if there are none."""
-        if self.insisting or not self._unheard:
+        if self.sending_more or not self._unacknowledged:
             self._end(now)
             return
         self._ending, self.cycles_left = Ending.MORE, MORE_CYCLES
@@ -350,7 +350,7 @@ class CyclicExchange(Generic[TelegramT]):
 
     def wait_out(self, now: float) -> None:
         """Come to the end of a stop that only waits for an answer, if that came."""
-        if self._ending and self._ending is not Ending.LAST and not self._unheard:
+        if self._ending and self._ending is not Ending.LAST and not self._unacknowledged:
             self._end(now)
 
     def _end(self, now: float) -> None:
@@ -359,18 +359,18 @@ class CyclicExchange(Generic[TelegramT]):
 
     def end_stop(self) -> None:
         """End the stop of all: nothing more is sent."""
-        self.doubt_the_end()
+        self.mark_silent()
         for each in self.audience:
             if not each.session.stopped:
                 each.session.stop_left()
 
     @property
-    def _unheard(self) -> bool:
+    def _unacknowledged(self) -> bool:
         """Whether somebody who ran has not shown to have heard one of the last cycles."""
-        return any(each.session.unshown for each in self.audience)
+        return any(each.session.unacknowledged for each in self.audience)
 
-    def doubt_the_end(self) -> None:
+    def mark_silent(self) -> None:
         """Record who ran, and has answered none of the last cycles."""
         for each in self.audience:
-            if each.session.unshown:
+            if each.session.unacknowledged:
                 each.session.duty.happened(Happened.SILENT)

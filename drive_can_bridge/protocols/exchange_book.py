@@ -191,7 +191,7 @@ class ExchangeBook:
         self.began_at = now
         if runs:
             self._ran_at = now
-            self.doubt()
+            self.invalidate()
         steady = self._came == 1
         if steady and self._steady:     # nothing is held
             self._given_up.clear()
@@ -203,12 +203,12 @@ class ExchangeBook:
         """Return whether what waits has had no time: only a cycle brought forward is so near."""
         return now < self._since + 0.5 * self._period
 
-    def doubt(self) -> None:
+    def invalidate(self) -> None:
         """Record that no cycle up to now shows that the drive was told to stop."""
         self._runs += 1
         self.stop_shown = False
 
-    def heard(self, received_at: float) -> None:
+    def answer_received(self, received_at: float) -> None:
         """Record an answer: to the oldest cycle that may still get one."""
         of = self._given_up if self._came and self._given_up else self._asked or self._given_up
         if of:
@@ -240,7 +240,7 @@ class ExchangeBook:
         if not self._asked and not self._given_up:
             return None
         before = self.overdue
-        self.heard(received_at)
+        self.answer_received(received_at)
         return max(before, self.overdue)
 
     @property

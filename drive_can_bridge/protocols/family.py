@@ -317,7 +317,7 @@ class Family(ABC):
         """
         return None
 
-    def tells_enabled(self, drive: DriveConfiguration,
+    def enabled_status(self, drive: DriveConfiguration,
                       ) -> tuple[Parameter, Callable[[int], bool]] | None:
         """Return what can be read to see whether a drive is enabled, and what it says then."""
         control = drive.profile.control

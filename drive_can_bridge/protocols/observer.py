@@ -150,7 +150,7 @@ class DriveObserver:
         if when < self.deadline:
             self.deadline = when
 
-    def tell(self, now: float, direction: Direction, kind: TelegramKind, title: str,
+    def report(self, now: float, direction: Direction, kind: TelegramKind, title: str,
              parameters: Sequence[Parameter] = (), raws: Sequence[int] = (), *,
              verdict: Verdict = _NORMAL, remark: str = '', latency: float = math.nan) -> None:
         """Emit a telegram, and count what is wrong with it."""
@@ -173,10 +173,10 @@ class DriveObserver:
         try:
             return decode(data)
         except (RemoteProtocolError, ValueError) as error:  # ValueError: of an enum
-            self.tell(now, direction, kind, title, verdict=Verdict.MALFORMED, remark=str(error))
+            self.report(now, direction, kind, title, verdict=Verdict.MALFORMED, remark=str(error))
             return None
 
-    def hear(self, identifier: int, direction: Direction, kind: TelegramKind, title: str,
+    def listen(self, identifier: int, direction: Direction, kind: TelegramKind, title: str,
              decode: Callable[[bytes], T], take: Callable[[T, float], None]) -> None:
         """
         Listen to frames with an identifier.

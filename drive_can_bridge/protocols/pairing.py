@@ -97,7 +97,7 @@ class CyclicWatch:
         return due if due > now else math.inf   # NaN: nothing is under way
 
     def _miss(self, now: float) -> None:
-        self._observer.tell(now, Direction.RESPONSE, TelegramKind.CYCLIC, 'cyclic response',
+        self._observer.report(now, Direction.RESPONSE, TelegramKind.CYCLIC, 'cyclic response',
                             verdict=Verdict.LOST,
                             remark=frame_sentences.unanswered_for(1e3 * (now - self._asked)))
         self._asked = math.nan
@@ -210,7 +210,7 @@ class PendingRequests(Generic[Key]):
             while len(self.about) > REMEMBERED and (
                     oldest := next(iter(self.about))) not in self._open:
                 del self.about[oldest]
-        self._tell(now, Direction.REQUEST, asked, words, remark=wrong,
+        self._report(now, Direction.REQUEST, asked, words, remark=wrong,
                    verdict=Verdict.SUSPICIOUS if wrong else Verdict.NORMAL)
 
     def answer(self, key: Key, asked: RequestContent, now: float, words: Sequence[int] | None, *,
@@ -231,7 +231,7 @@ class PendingRequests(Generic[Key]):
                                 parts=parts if refusal else ())
         if refusal or wrong:
             verdict = Verdict.REFUSED if refusal else Verdict.MALFORMED
-        self._tell(now, Direction.RESPONSE, asked, None if refusal else words, verdict=verdict,
+        self._report(now, Direction.RESPONSE, asked, None if refusal else words, verdict=verdict,
                    remark=refusal or remark or wrong, latency=latency)
 
     def expire(self, now: float) -> float:
@@ -247,7 +247,7 @@ class PendingRequests(Generic[Key]):
             if not asked.writes:
                 self.round.failed(asked.span)
             self._observer.observed.unanswered += asked.kind is TelegramKind.PARAMETER
-            self._tell(due, Direction.RESPONSE, asked._replace(title=self._missing), None,
+            self._report(due, Direction.RESPONSE, asked._replace(title=self._missing), None,
                        verdict=Verdict.LOST, remark='no answer')
             if len(self._given_up) > 64:
                 self._given_up = {key: at for key, at in self._given_up.items()
@@ -275,10 +275,10 @@ class PendingRequests(Generic[Key]):
         before = now < self._certain_from and key not in self.about
         return Verdict.NORMAL if before else Verdict.UNASKED, math.nan
 
-    def _tell(self, now: float, direction: Direction, asked: RequestContent,
+    def _report(self, now: float, direction: Direction, asked: RequestContent,
               words: Sequence[int] | None,
               **more: Any) -> None:
-        self._observer.tell(now, direction, asked.kind, asked.title or _TITLES[asked.writes],
+        self._observer.report(now, direction, asked.kind, asked.title or _TITLES[asked.writes],
                             *self._content(asked.span, words), **more)
 
 

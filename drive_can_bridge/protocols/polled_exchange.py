@@ -117,7 +117,7 @@ class PolledExchange:
 
     :ivar timer: when the next round is due.
     :ivar reading: a round is under way.
-    :ivar slack: says what would have held.
+    :ivar timing: says what would have held.
     :ivar received_at: when the last answer was received.
     """
 

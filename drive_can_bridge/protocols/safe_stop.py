@@ -72,8 +72,8 @@ def write_until_answered(
 class _Kind(NamedTuple):
     """What a stop is about, as it was when it began; ``whole``: all that can be told is in it."""
 
-    owed: bool
-    insists: bool
+    stop_pending: bool
+    always_report: bool
     again: bool
     whole: bool
 
@@ -127,40 +127,40 @@ class SafeStop(Generic[StepT, ReplyT]):
         return found
 
     def begin(self, procedure: Generator[StepT, ReplyT, list[Sentence]], now: float, *,
-              setpoints: bool = True, insist: bool = False, again: bool = False) -> None:
+              setpoints: bool = True, always_report: bool = False, again: bool = False) -> None:
         """
         Begin.
 
         :param procedure: returns what failed, in words; nothing: the drive has confirmed it all.
         :param setpoints: False: they are stopped in another way.
-        :param insist: what failed is told even if the drive was not told to run.
+        :param always_report: what failed is told even if the drive was not told to run.
         :param again: that it failed before was told: what is new is that it does not.
         """
         session = self._session
         self.running = True
-        kind = _Kind(session.owed and not again, insist, again,
+        kind = _Kind(session.stop_pending and not again, always_report, again,
                      setpoints and not session.interlock.position_unknown)
         self._channel.run(
-            self._then_look(procedure), partial(self._done, kind), now, Priority.STOP)
+            self._then_poll(procedure), partial(self._done, kind), now, Priority.STOP)
 
-    def look(self, now: float) -> None:
+    def poll(self, now: float) -> None:
         """Read the status at the end of a stop by other means, if it does not come by itself."""
         if self._status is not None and not self.running:
             self.running = True
-            self._channel.run(self._look(), self._looked, now, Priority.STOP)
+            self._channel.run(self._poll(), self._polled, now, Priority.STOP)
 
     def forget(self) -> None:
         """Record that the channel was cleared."""
         self.running = False
 
-    def _then_look(self, procedure: Generator[StepT, ReplyT, list[Sentence]],
+    def _then_poll(self, procedure: Generator[StepT, ReplyT, list[Sentence]],
                    ) -> Generator[StepT, ReplyT, list[Sentence]]:
         failed = yield from procedure
         if not failed:
-            yield from self._look()
+            yield from self._poll()
         return failed
 
-    def _look(self) -> Generator[StepT, ReplyT, None]:
+    def _poll(self) -> Generator[StepT, ReplyT, None]:
         session = self._session
         if self._status is None or session.active or not session.online:
             return
@@ -168,7 +168,7 @@ class SafeStop(Generic[StepT, ReplyT]):
         if raw is not None:
             session.interlock.status(raw, self._channel.now)
 
-    def _looked(self, _: None) -> None:
+    def _polled(self, _: None) -> None:
         self.running = False
         self._ended()
 
@@ -177,7 +177,7 @@ class SafeStop(Generic[StepT, ReplyT]):
         if kind.again:
             self.again_at = self._channel.now
         # it may have fallen silent since: with what it was told just before
-        owed = kind.owed or session.owed and not kind.again
+        stop_pending = kind.stop_pending or session.stop_pending and not kind.again
         if not failed:
             if kind.whole:
                 session.duty.happened(Happened.STOPPED)
@@ -186,10 +186,10 @@ class SafeStop(Generic[StepT, ReplyT]):
                     session.duty.channel(CONTROL_WORD, happened)
                 if not session.active:  # in its end, to be disabled is enough
                     session.duty.happened(Happened.ANSWERED)
-            if kind.again and not session.owed:
+            if kind.again and not session.stop_pending:
                 session.report.note(Noted(sentences.stopped_again()))
-        elif owed or kind.insists:
-            session.report.warn(sentences.stop_failed(failed), may_run=owed)
+        elif stop_pending or kind.always_report:
+            session.report.warn(sentences.stop_failed(failed), may_run=stop_pending)
             # the activation ends with it: there is no more to be said; behind a defect it goes on
             if not session.activated:
                 session.duty.happened(Happened.SAID)
@@ -221,7 +221,7 @@ class StopAgain:
         self._pause = PAUSE
         self._first = True
 
-    def heard(self, now: float, *, hurry: bool = False, answered: bool = False) -> None:
+    def sign_of_life(self, now: float, *, hurry: bool = False, answered: bool = False) -> None:
         """
         Record a sign of life, before an answer is taken that it may be.
 

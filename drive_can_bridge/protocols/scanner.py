@@ -78,7 +78,7 @@ class Scanner(ABC):
         self._questions: list[Frame] = []
 
     @abstractmethod
-    def hear(self, frame: Frame, now: float) -> None:
+    def receive(self, frame: Frame, now: float) -> None:
         """Handle a frame from the bus (not one of our own)."""
 
     @abstractmethod
@@ -92,10 +92,10 @@ class Scanner(ABC):
     def asked(self, frame: Frame, now: float) -> None:
         """Record a question of our own: its answer is no sign of a master."""
         self._ours = True
-        self.hear_request(frame, now)
+        self.receive_request(frame, now)
         self._ours = False
 
-    def hear_request(self, frame: Frame, now: float) -> None:
+    def receive_request(self, frame: Frame, now: float) -> None:
         """Note a request, where answers are only known by what was asked."""
         return
 

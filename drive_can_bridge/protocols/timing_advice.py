@@ -34,12 +34,12 @@ class TimingAdvice:
     :param period_max: the longest period that is allowed for it.
     """
 
-    __slots__ = ('_drive', '_period_max', '_report', '_told', 'since')
+    __slots__ = ('_drive', '_period_max', '_report', '_reported', 'since')
 
     def __init__(self, drive: DriveConfiguration, report: Reporter,
                  period_max: float = math.inf) -> None:
         self._drive, self._report, self._period_max = drive, report, period_max
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         #: when its last answer came, of a drive that is lost for want of more; infinity: it is not
         self.since = math.inf
 
@@ -57,25 +57,25 @@ class TimingAdvice:
         drive = self._drive
         if 0.0 < gap <= GAP_MAX:
             limit = max(drive.missed_limit, math.floor(MARGIN * gap / drive.period)) + 1
-            self.tell('missed_limit', sentences.more_missed_would_hold(
+            self.report_once('missed_limit', sentences.more_missed_would_hold(
                 gap=gap, limit=limit, seconds=limit * drive.period))
 
     def late(self, seconds: float) -> Sentence:
         """Return what would have held for an answer so many s after its period: once."""
         period = enough(self._drive.period + seconds)
-        if period > self._period_max or 'period' in self._told:
+        if period > self._period_max or 'period' in self._reported:
             return NOTHING
-        self._told.add('period')
+        self._reported.add('period')
         return sentences.longer_period_would_hold(late=seconds, period=period)
 
     def heartbeat(self, gap: float) -> None:
         """Report what would have held by a heartbeat that came so many s after the last."""
         if 0.0 < gap <= GAP_MAX:
-            self.tell('heartbeat_timeout', sentences.longer_timeout_would_hold(
+            self.report_once('heartbeat_timeout', sentences.longer_timeout_would_hold(
                 gap=gap, timeout=enough(gap)))
 
-    def tell(self, key: str, text: Sentence) -> None:
+    def report_once(self, key: str, text: Sentence) -> None:
         """Report of a key what would have held, once."""
-        if key not in self._told:
-            self._told.add(key)
+        if key not in self._reported:
+            self._reported.add(key)
             self._report.warn(text)

@@ -14,7 +14,7 @@ from typing import Any, Generic, TypeVar
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import Sentence
-from drive_can_bridge.core.requests import ABSENT_CODES, Failure, refused, RetryPolicy
+from drive_can_bridge.core.requests import Failure, FailureKind, refused, RetryPolicy
 
 #: what an answer that does not say what it answers can be mistaken for
 ANYTHING: Hashable = 'anything'
@@ -52,7 +52,7 @@ class Refused:
     @property
     def absent(self) -> bool:
         """The drive says that it has no such object."""
-        return self.code in ABSENT_CODES
+        return self.failure.kind is FailureKind.ABSENT
 
     @property
     def failure(self) -> Failure:
@@ -183,7 +183,7 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
         """Return what a late answer to the step could be mistaken for; None: nothing."""
         return None
 
-    def doubted(self, step: StepT) -> Hashable | None:
+    def late_key(self, step: StepT) -> Hashable | None:
         """Return by which key late answers to others can be taken for that to a stop."""
         return self.key(step)
 
@@ -209,7 +209,7 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
         """Return until when a step of a user waits, while others go on."""
         return -math.inf
 
-    def time_lost(self, now: float) -> ReplyT | bool:
+    def handle_stall(self, now: float) -> ReplyT | bool:
         """
         Record that nobody listened until now.
 

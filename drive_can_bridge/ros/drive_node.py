@@ -314,7 +314,7 @@ class DriveNode(DriveListener):
         That was reported, and it was not online again since; or its stop is not over.
         """
         session = self.session
-        return bool(self._may_run or session.owed or session.defect or not session.stopped)
+        return bool(self._may_run or session.stop_pending or session.defect or not session.stopped)
 
     def looked_at(self, entered: bool) -> None:
         """

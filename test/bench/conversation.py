@@ -111,9 +111,9 @@ class Conversation:
         self.session.deactivate(now)
         return self.sent()
 
-    def time_lost(self, now: float) -> list[str]:
+    def handle_stall(self, now: float) -> list[str]:
         self.now = now
-        self.session.time_lost(now)
+        self.session.handle_stall(now)
         return self.sent()
 
     def submits(self, request: Request, now: float) -> list[str]:

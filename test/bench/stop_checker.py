@@ -438,7 +438,7 @@ class World:
         self.now += 1.3
         self.ends()
         for session in self.sessions:
-            session.time_lost(self.now)
+            session.handle_stall(self.now)
 
     def _late_process(self) -> None:
         """Stand still for less than a second; what arrived meanwhile comes first."""

@@ -157,7 +157,7 @@ def test_bus_down_is_silence_at_once(partner: Partner) -> None:
 def test_stop_right_after_a_stall(partner: Partner) -> None:
     run(partner)
     partner.now += 1.5
-    partner.deliver(partner.talk.time_lost(partner.now))
+    partner.deliver(partner.talk.handle_stall(partner.now))
     partner.ends(1.0)
     assert partner.registers[50] == 0
     assert not worries(partner)
@@ -342,7 +342,7 @@ def test_after_an_upset_it_wants_arming_again(partner: Partner, upset: str) -> N
         partner.deliver(talk.bus_up(partner.now))
     else:
         partner.now += 5.0
-        partner.deliver(talk.time_lost(partner.now))
+        partner.deliver(talk.handle_stall(partner.now))
     partner.live(1.0)
     assert talk.session.online
     assert set(partner.commanded()) <= {0}

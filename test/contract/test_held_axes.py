@@ -139,7 +139,7 @@ def test_standard_stop_of_the_rest_is_none_of_an_axis_that_may_be_anywhere() -> 
     talk.commands(0, 9.0, 10.011)
     assert [text for _, text in talk.until(10.0215)] == ['3F1#063C005A00000000', ASK]
     talk.hears('7F1#01004700ADDEADDE', 10.022)
-    assert talk.time_lost(12.0) == ['3F1#0632000000000000']
+    assert talk.handle_stall(12.0) == ['3F1#0632000000000000']
     assert talk.until(12.0015) == [(12.001, '3F1#0332000100000000')]
     talk.events()
     assert talk.hears('7F1#0000ADDEADDEADDE', 12.002) == []

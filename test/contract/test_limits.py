@@ -94,7 +94,7 @@ class TestInEveryState:
         limits(partner, 30.0)
         partner.live(0.1)
         session = partner.talk.session
-        assert not session.duty.owed
+        assert not session.duty.stop_pending
         assert session.setpoints.at_rest
 
     @pytest.mark.parametrize('value', [30.0, 100.0, 50.0])

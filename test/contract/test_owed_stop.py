@@ -136,7 +136,7 @@ def test_a_second_end_and_a_stall_meanwhile_change_nothing(kind: str) -> None:
     partner.deliver(partner.talk.deactivate(partner.now))
     partner.live(0.03)
     partner.now += 1.5
-    partner.deliver(partner.talk.time_lost(partner.now))
+    partner.deliver(partner.talk.handle_stall(partner.now))
     assert partner.talk.commands(0, 100.0, partner.now) is not CommandOutcome.ACCEPTED
     partner.live(partner.talk.session.longest_stop + 0.5)
     assert partner.talk.session.stopped
@@ -155,12 +155,12 @@ def test_a_silent_drive_that_ran_is_told_of_once(kind: str) -> None:
     partner.live(20.0)
     assert set(partner.commanded()) <= {0}
     assert worries(partner) == []
-    assert partner.talk.session.duty.owed
+    assert partner.talk.session.duty.stop_pending
     partner.deaf = False
     partner.live(2.0)
     assert partner.talk.session.online
     assert partner.registers[50] == 0
-    assert not partner.talk.session.duty.owed
+    assert not partner.talk.session.duty.stop_pending
     assert worries(partner) == []
 
 
@@ -192,7 +192,7 @@ def test_what_the_bus_refused_was_never_told(kind: str) -> None:
     else:
         partner.commands(0.0, 100.0)
     partner.live(0.025)
-    assert not partner.talk.session.duty.owed
+    assert not partner.talk.session.duty.stop_pending
     partner.talk.bus_down(partner.now)
     assert worries(partner) == []
 
@@ -204,7 +204,7 @@ def test_an_activation_owes_nothing_of_the_one_before(kind: str) -> None:
     partner.deliver(partner.talk.deactivate(partner.now))
     assert len(worries(partner)) == 2
     partner.activate()
-    assert not partner.talk.session.duty.owed
+    assert not partner.talk.session.duty.stop_pending
     assert partner.talk.control_outcomes() == []
     partner.live(1.0)
     assert partner.talk.session.state is PARTNERS[KINDS[kind][0]].idle or kind in TABLED
@@ -230,11 +230,11 @@ def test_a_stop_that_failed_for_a_defect_is_owed_on(kind: str) -> None:
     partner = stopped_for_a_defect(kind, mute=True)
     session = partner.talk.session
     assert worries(partner)
-    assert session.owed
-    session.begin_anew(partner.now)
+    assert session.stop_pending
+    session.recover(partner.now)
     partner.deliver(partner.talk.sent())
     partner.live(2.0)
-    assert session.owed
+    assert session.stop_pending
     partner.talk.events()
     partner.ends()
     assert len(worries(partner)) == 1
@@ -245,13 +245,13 @@ def test_who_is_owed_a_stop_behind_a_defect_is_told_again_by_the_end(kind: str) 
     """Also within the second for which it is left alone: it may hear this one."""
     partner = stopped_for_a_defect(kind, mute=True)
     session = partner.talk.session
-    assert session.owed
+    assert session.stop_pending
     partner.deaf = False
     partner.talk.events()
     partner.ends()
     assert partner.registers[50] == 0
     assert worries(partner) == []
-    assert not session.owed
+    assert not session.stop_pending
 
 
 @pytest.mark.parametrize('kind', KINDS)
@@ -268,7 +268,7 @@ def test_who_is_owed_a_stop_behind_a_defect_and_deaf_is_named_once_more(kind: st
 def test_who_is_owed_nothing_behind_a_defect_is_left_alone_by_the_end(kind: str) -> None:
     partner = stopped_for_a_defect(kind, mute=False)
     session = partner.talk.session
-    assert not session.owed
+    assert not session.stop_pending
     partner.take()
     partner.ends()
     assert partner.take() == []

@@ -93,14 +93,15 @@ def _heard(self: ExchangeBook, received_at: float) -> None:
     self.stop_shown = True
 
 
-HEARD, DONE = ExchangeBook.heard, SafeStop._done
+HEARD, DONE = ExchangeBook.answer_received, SafeStop._done
 #: what is broken, and a story of a kind in which that shows
 DEFECTS: list[tuple[type, str, Any, str, Story]] = [
     (StopDuty, 'channel', _nothing, 'CANnord', (('bus down', 0.013),)),
     (StopDuty, 'channel', _nothing, 'PKW, no word', (('bus down', 0.013),)),
     (StopDuty, 'happened', lambda self, happened: Do.NOTHING, '29 bit, no word',
      (('silent', 0.0), ('end', 0.0))),
-    (ExchangeBook, 'heard', _heard, 'CANnord', (('late', 0.4), ('silent', 0.0), ('end', 0.0))),
+    (ExchangeBook, 'answer_received', _heard, 'CANnord',
+     (('late', 0.4), ('silent', 0.0), ('end', 0.0))),
     (SafeStop, '_done', lambda self, kind, failed: DONE(self, kind, []), '11 bit, no word',
      (('silent', 0.0), ('end', 0.0))),
     (ControlMachine, 'withdraw', _nothing, 'CANnord', (('silent', 0.9), ('well', 0.9))),

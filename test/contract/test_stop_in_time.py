@@ -56,7 +56,7 @@ def test_a_stop_that_does_not_take_ends_in_time(protocol: str, storage: Storage 
     assert min(registers[number] for number in (50, 51, 40, 41)) > 0
     registers.stuck, delay = True, SLOW
     if protocol == 'datamodel_extended':    # whose maps have to be read again: stopped by numbers
-        line.took(talk.time_lost(11.0))
+        line.took(talk.handle_stall(11.0))
     line.plan(11.0001, partial(talk.deactivate))
     line.live(11.0001 + talk.session.longest_stop)
     assert talk.session.stopped

@@ -190,7 +190,7 @@ class Acting:
     def clear(self) -> None:
         self._log.append(f'{self._name} cleared')
 
-    def time_lost(self, now: float) -> None:
+    def handle_stall(self, now: float) -> None:
         self._log.append(f'{self._name} stood')
 
 
@@ -205,7 +205,7 @@ class Parts(Session):
         self.services = DriveServices(self, Idle.Server(Idle(drive(), None)))
         self.first, self.second = Acting('first', self.log), Acting('second', self.log)
         self.channel = Acting('channel', self.log)
-        self.look_after(self.first, self.second, channel=self.channel)
+        self.set_parts(self.first, self.second, channel=self.channel)
 
     def begin(self, now: float) -> None:
         self.log.append('begin')
@@ -214,7 +214,7 @@ class Parts(Session):
         self.log.append('stop')
         return True
 
-    def see_to_control_word(self, now: float) -> None:
+    def update_control_word(self, now: float) -> None:
         self.log.append('control word')
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
@@ -277,14 +277,14 @@ def test_only_a_stop_is_ended() -> None:
 def test_a_stall_begins_anew_but_lets_a_stop_go_on() -> None:
     made = with_parts()
     made.online = True
-    made.time_lost(5.0)
+    made.handle_stall(5.0)
     assert made.log == ['channel stood', 'begin']
     assert made.take_events() == [StationLost(says('bridge_stood_still'))]
     made.deactivate(6.0)
     made.log.clear()
-    made.time_lost(8.0)
+    made.handle_stall(8.0)
     assert made.log == ['channel stood']
     made.give_up(9.0)
     made.log.clear()
-    made.time_lost(10.0)
+    made.handle_stall(10.0)
     assert made.log == ['channel stood']

@@ -269,14 +269,14 @@ def test_a_drive_that_was_deaf_to_the_stop_for_a_defect_is_told_by_the_end(
     session = members[place].session
     assert session.defect
     assert session.stopped
-    assert session.owed
+    assert session.stop_pending
     monkeypatch.setattr('time.sleep', lambda _: world.live(0.002))
     monkeypatch.setattr(world.exchange, '_pass_to_stop', lambda: None)
     assert world.exchange.deactivate()
     world.took()
     assert all(session.stopped for session in world.bench.sessions)
     assert [device.registers[50] for device in world.devices] == [0, 0]
-    assert not any(session.owed for session in world.bench.sessions)
+    assert not any(session.stop_pending for session in world.bench.sessions)
 
 
 def test_online_again_is_told() -> None:
@@ -367,13 +367,13 @@ def test_what_waits_for_others_is_not_thrown_away_when_a_drive_begins_anew() -> 
 def test_what_comes_just_before_a_drive_begins_anew_is_of_a_drive_that_is_lost(
         monkeypatch: pytest.MonkeyPatch) -> None:
     world = World('29 bit')
-    first, begin_anew, waiting = world.bench.notes[0], Member.begin_anew, []
+    first, recover, waiting = world.bench.notes[0], Member.recover, []
 
     def command_and_begin(member: Member, now: float) -> None:
         first.commands.append((0, 0.0))
-        begin_anew(member, now)
+        recover(member, now)
         waiting.extend(first.commands)
-    monkeypatch.setattr(Member, 'begin_anew', command_and_begin)
+    monkeypatch.setattr(Member, 'recover', command_and_begin)
     first.failing = True
     world.live(PERIOD)
     first.failing = False

@@ -153,7 +153,7 @@ def test_forgotten_question_is_not_asked_again_before_its_answer_would_have_come
 def test_after_a_stall_the_silence_begins_anew() -> None:
     line = Line()
     line.asks('A', now=1.0)
-    line.channel.time_lost(5.0)
+    line.channel.handle_stall(5.0)
     line.channel.clear()
     assert line.asks('A', now=5.0) == []
     assert line.at(5.0999) == []
@@ -164,7 +164,7 @@ def test_quarantine_that_nobody_listened_through_is_prolonged() -> None:
     line = Line()
     line.asks('A', now=1.0)
     assert line.at(1.1) == []
-    line.channel.time_lost(1.2002)      # just at its end
+    line.channel.handle_stall(1.2002)      # just at its end
     assert line.asks('A', now=1.2002) == []
     assert line.at(1.2103) == ['A']
 
@@ -317,6 +317,6 @@ class TestStopsInQuarantine:
             self, idle_until: float, first: list[str]) -> None:
         line = self.forgotten()
         line.at(idle_until)
-        line.channel.time_lost(5.0)
+        line.channel.handle_stall(5.0)
         assert line.asks('A', now=5.01, priority=Priority.STOP) == ['A']
         assert line.answer('first', 5.02) == first

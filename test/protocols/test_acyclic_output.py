@@ -71,18 +71,18 @@ def repeats(policy: Policy, control: ControlMachine, *statuses: int) -> list[int
 
 def test_setpoints_are_written_on_change_and_again_after_a_while() -> None:
     writes = schedule(2, refresh=0.5)
-    writes.look([0, 7], 10.0)
+    writes.collect_due([0, 7], 10.0)
     assert [writes.next(), writes.next()] == [0, 1]
     assert not writes.waiting
     writes.written(0, 0, 10.0)
     writes.written(1, 7, 10.001)
-    writes.look([0, 7], 10.4)
+    writes.collect_due([0, 7], 10.4)
     assert not writes.waiting
-    writes.look([0, 8], 10.42)
-    writes.look([0, 8], 10.44)
+    writes.collect_due([0, 8], 10.42)
+    writes.collect_due([0, 8], 10.44)
     assert writes.next() == 1
     writes.written(1, 8, 10.44)
-    writes.look([0, 8], 10.5)
+    writes.collect_due([0, 8], 10.5)
     assert writes.next() == 0
     assert not writes.waiting
 
@@ -90,48 +90,48 @@ def test_setpoints_are_written_on_change_and_again_after_a_while() -> None:
 def test_one_may_go_before_the_others() -> None:
     writes = schedule(3, slot=2)
     writes.order_word(first=True)
-    writes.look([1, 2, 3], 10.0)
+    writes.collect_due([1, 2, 3], 10.0)
     writes.order_word(first=True)
     assert [writes.next(), writes.next(), writes.next()] == [2, 0, 1]
 
 
 def test_one_may_go_behind_the_others() -> None:
     writes = schedule(3, slot=0)
-    writes.look([1, 2, 3], 10.0)
+    writes.collect_due([1, 2, 3], 10.0)
     writes.order_word(first=False)
     assert [writes.next(), writes.next(), writes.next()] == [1, 2, 0]
 
 
 def test_without_refresh_only_changes_are_written() -> None:
     writes = schedule(1)
-    writes.look([3], 10.0)
+    writes.collect_due([3], 10.0)
     writes.written(writes.next(), 3, 10.0)
-    writes.look([3], 1e6)
+    writes.collect_due([3], 1e6)
     assert not writes.waiting
 
 
 def test_what_failed_and_what_was_forgotten_is_due_again() -> None:
     writes = schedule(2)
-    writes.look([1, 2], 10.0)
+    writes.collect_due([1, 2], 10.0)
     writes.written(writes.next(), 1, 10.0)
     index = writes.next()
     writes.failed(index)
-    writes.look([1, 2], 10.1)
+    writes.collect_due([1, 2], 10.1)
     assert writes.next() == 1
     assert not writes.waiting
     writes.written(1, 2, 10.1)
     writes.forget()
-    writes.look([1, 2], 10.2)
+    writes.collect_due([1, 2], 10.2)
     assert [writes.next(), writes.next()] == [0, 1]
 
 
 def test_everything_may_be_written_whether_it_has_changed_or_not() -> None:
     writes = schedule(2)
-    writes.look([1, 2], 10.0)
+    writes.collect_due([1, 2], 10.0)
     for index, raw in ((0, 1), (1, 2)):
         writes.written(index, raw, 10.0)
     writes.write_all()
-    writes.look([1, 2], 10.1, hold=[0])
+    writes.collect_due([1, 2], 10.1, hold=[0])
     assert (writes.next(), writes.waiting) == (1, 0)
 
 
@@ -141,19 +141,19 @@ def test_everything_may_be_written_whether_it_has_changed_or_not() -> None:
 def test_all_setpoints_are_written_again_right_before_enable() -> None:
     control = machine(STANDING)
     output = AcyclicOutput(control, JUDGED, 3, slot=1)
-    output.look([0, OFF, 0], 10.0)
+    output.collect_due([0, OFF, 0], 10.0)
     for index in range(3):
         output.written(index, 0, 10.0)
     assert not output.holds_word(), 'nothing starts'
     ask(control, ControlAction.ENABLE)
     assert control.word == RUN
     assert output.holds_word()
-    output.look([0, RUN, 0], 10.1, hold=[1])
+    output.collect_due([0, RUN, 0], 10.1, hold=[1])
     assert [output.next(), output.next()] == [0, 2]
     assert not output.has(1), 'that is the word'
     assert not output.has(0)
     assert output.holds_word()
-    output.start_over()
+    output.restart()
     assert output.holds_word(), 'nobody knows whether the drive was there to hear it'
     assert [output.has(2), output.has(0)] == [False, True]
     assert not output.holds_word()
@@ -224,14 +224,14 @@ def test_a_drive_that_ran_and_reports_nothing_gets_its_stop_three_times_more(
     assert output.again_at == math.inf, 'that is not repeated'
     ask(control, ControlAction.DISABLE)
     tell(output, control, 10.0)
-    told = []
+    last_written = []
     while output.again_at < math.inf:
         now = output.again_at
         assert output.handle_timer(now)
         assert output.word_due(now)
-        told.append(round(1000 * (now - 10.0)))
+        last_written.append(round(1000 * (now - 10.0)))
         tell(output, control, now)
-    assert told == again
+    assert last_written == again
 
 
 def test_a_pulse_leaves_as_often_as_it_has_to() -> None:
@@ -241,7 +241,7 @@ def test_a_pulse_leaves_as_often_as_it_has_to() -> None:
     *_, last = times = [10.0 + 0.02 * number for number in range(RESET_CYCLES)]
     for now in times:
         assert control.word == RESET
-        output.look([RESET], now)
+        output.collect_due([RESET], now)
         assert output.next() == 0
         output.written(0, RESET, now)
         assert output.word_left(now, RESET)

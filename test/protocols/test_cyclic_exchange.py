@@ -31,7 +31,7 @@ class Silent:
     def advance(self, now: float) -> None:
         pass
 
-    def time_lost(self, now: float) -> None:
+    def handle_stall(self, now: float) -> None:
         pass
 
     def clear(self) -> None:
@@ -53,7 +53,7 @@ class Plain(Session):
         self.services = DriveServices(self, server)
         self.answers = CycleAnswers(self, silence='no answer', advice='the plug')
         self.exchange = CyclicExchange(self.answers, self, slot=0)
-        self.look_after(self.exchange, channel=Silent())
+        self.set_parts(self.exchange, channel=Silent())
 
     def begin(self, now: float) -> None:
         self.exchange.stop()
@@ -67,8 +67,8 @@ class Plain(Session):
     def longest_stop(self) -> float:
         return self.exchange.longest_stop
 
-    def see_to_control_word(self, now: float) -> None:
-        self.exchange.hurry(now, setpoints=self.owed)
+    def update_control_word(self, now: float) -> None:
+        self.exchange.hurry(now, setpoints=self.stop_pending)
 
     def encode_cycle(self, raws: list[int]) -> bytes:
         return bytes(raws)

@@ -240,14 +240,14 @@ def test_a_drive_that_begins_anew_behind_a_defect_costs_no_other_its_command(
     publisher = client.node.create_publisher(JointState, COMMANDS, 1)
     wait_until(lambda: publisher.get_subscription_count() == 2)
     again = []
-    begin_anew = Member.begin_anew
+    recover = Member.recover
 
     def command_and_begin(member: Member, now: float) -> None:
         if not again:
             publisher.publish(JointState(name=names, velocity=[20 * RPM, 20 * RPM]))
         again.append(member.session)
-        begin_anew(member, now)
-    monkeypatch.setattr(Member, 'begin_anew', command_and_begin)
+        recover(member, now)
+    monkeypatch.setattr(Member, 'recover', command_and_begin)
 
     def fail(*_: Any) -> None:
         monkeypatch.delattr(east.session.services, 'command')

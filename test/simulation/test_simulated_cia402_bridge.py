@@ -295,7 +295,7 @@ def happens(cable: Cable, what: str) -> None:
         session.bus_up(cable.now)
     elif what == 'stall':
         cable.now += 1.5
-        session.time_lost(cable.now)
+        session.handle_stall(cable.now)
     else:
         cable.drives[0].fault(what, cable.now)
     cable._collect()

@@ -144,7 +144,7 @@ def test_commands_arrive_and_end(cable: Cable) -> None:
     cable.run(0.1)
     session.deactivate(cable.now)
     cable.run(1.0)
-    assert session.stopped and not session.owed
+    assert session.stopped and not session.stop_pending
     assert horse.value('speed_setpoint') == 0.0
 
 

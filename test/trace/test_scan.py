@@ -142,7 +142,7 @@ def frame_of(text: str) -> Frame:
 def scanned(protocol: str, *frames: tuple[float, str]) -> Scanner:
     scanner = FAMILIES[protocol].make_scanner()
     for time, text in frames:
-        scanner.hear(frame_of(text), time)
+        scanner.receive(frame_of(text), time)
     return scanner
 
 
@@ -185,7 +185,7 @@ def test_noise_makes_no_drive() -> None:
     noise = Random(1)
     scanner = FAMILIES['datamodel_extended'].make_scanner()
     for place in range(3000):
-        scanner.hear(Frame(noise.getrandbits(29), noise.randbytes(8), True), place / 2000)
+        scanner.receive(Frame(noise.getrandbits(29), noise.randbytes(8), True), place / 2000)
     assert not scanner.sightings
 
 
@@ -213,7 +213,7 @@ def test_whatever_others_say_in_whatever_order_a_file_can_be_written(
     for turn in range(100):
         frames = choose.choice((cycle * 3, choose.sample(said, 2), [choose.choice(said)]))
         for frame, scanner in ((frame, each) for frame in frames for each in scanners.values()):
-            scanner.hear(frame, 0.01 * turn)
+            scanner.receive(frame, 0.01 * turn)
             question = scanner.take_question()
             if question is not None:
                 scanner.asked(question, 0.01 * turn)
@@ -308,7 +308,7 @@ def test_a_node_of_another_profile_is_no_drive() -> None:
 def test_a_slow_answer_to_a_question_of_ours_is_one() -> None:
     scanner = FAMILIES['datamodel_extended'].make_scanner()
     scanner.asked(frame_of('004007A4#0000000000000000'), 0.0)
-    scanner.hear(frame_of('104007A4#0032003300000000'), 0.25)
+    scanner.receive(frame_of('104007A4#0032003300000000'), 0.25)
     assert [sighting.certainty for sighting in scanner.sightings.values()] == [Certainty.CERTAIN]
     assert not scanner.master
 
@@ -472,7 +472,7 @@ def test_what_is_written_is_valid_whatever_the_maps(
     scanner = FAMILIES['datamodel_extended'].make_scanner()
     for identifier, data in ((0x104007A4, request_map), (0x104007E4, response_map)):
         scanner.asked(Frame(identifier & ~DIR, bytes(8), True), 1.0)
-        scanner.hear(Frame(identifier, bytes.fromhex(data), True), 1.0)
+        scanner.receive(Frame(identifier, bytes.fromhex(data), True), 1.0)
     output = tmp_path / 'found.yaml'
     write_parameter_file(output, BusConfiguration('main', 'virtual', 'a', 500_000),
                          [scanner.sightings[2]], [scanner.settings(2)])

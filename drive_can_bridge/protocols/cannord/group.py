@@ -133,8 +133,8 @@ class Group:
             self._turn = self._turn_begun
         self._turn_begun = self._turn
         self._put(self._broadcast, payloads, *exchange.audience)
-        if exchange.insisting:
-            alone = [member for member in members if member.session.unshown]
+        if exchange.sending_more:
+            alone = [member for member in members if member.session.unacknowledged]
         else:   # a stop reaches also those that do not listen to broadcasts
             turns = math.ceil(count / STOP_CYCLES) if stopping else 1
             alone = [members[(self._turn + place) % count] for place in range(turns)]
@@ -191,7 +191,7 @@ class Group:
     def _unheard(self) -> Sentence:
         """Return which inverters were commanded, and have not answered since they were stopped."""
         names = [session.configuration.name for session in self._sessions
-                 if session.unshown and not session.online]
+                 if session.unacknowledged and not session.online]
         return sentences.members_may_run(names) if names else NOTHING
 
     # -- what the leader does for all -------------------------------------------------------------

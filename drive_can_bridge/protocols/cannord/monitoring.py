@@ -77,7 +77,7 @@ class TimeoutWatch:
         self._ask_at = -math.inf
         self._told = NOTHING
 
-    def look(self, now: float) -> None:
+    def poll(self, now: float) -> None:
         """Read it, unless that is under way, or nobody answered lately."""
         if self._parameter is not None and now >= self._ask_at and (
                 self._access.channel.is_idle(Priority.OWN)):
@@ -89,7 +89,7 @@ class TimeoutWatch:
                 parameter.number == TIMEOUT_NUMBER and isinstance(outcome, Written)
                 for (parameter, _), outcome in zip(request.items, outcomes)):
             self._ask_at = -math.inf    # now it is known to answer
-            self.look(self._access.channel.now)
+            self.poll(self._access.channel.now)
 
     def _take(self, outcomes: Outcomes) -> None:
         outcome, = outcomes

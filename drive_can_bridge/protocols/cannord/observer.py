@@ -61,9 +61,9 @@ class CannordObserver(DriveObserver):
             objects[MessageObject.PROCESS_REQUEST]: self._take_request,
             objects[MessageObject.PROCESS_RESPONSE]: self._take_response,
         }
-        self.hear(objects[MessageObject.PARAMETER_TASK], _REQUEST, _PARAMETER, 'parameter task',
+        self.listen(objects[MessageObject.PARAMETER_TASK], _REQUEST, _PARAMETER, 'parameter task',
                   partial(self._frame, Task), self._take_task)
-        self.hear(objects[MessageObject.PARAMETER_RESPONSE], _RESPONSE, _PARAMETER,
+        self.listen(objects[MessageObject.PARAMETER_RESPONSE], _RESPONSE, _PARAMETER,
                   'parameter response', partial(self._frame, ResponseId), self._take_task_response)
         broadcast = broadcast_identifier(drive)
         self._paced_by_broadcast = leads and broadcast is not None
@@ -106,14 +106,14 @@ class CannordObserver(DriveObserver):
                       verdict: Verdict = Verdict.NORMAL, remark: str = '') -> None:
         raws = self._main(data, now, _REQUEST, title)
         if raws:
-            self.tell(now, _REQUEST, _CYCLIC, title, self._parameters[_REQUEST][0], raws,
+            self.report(now, _REQUEST, _CYCLIC, title, self._parameters[_REQUEST][0], raws,
                       verdict=verdict, remark=remark)
 
     def _main(self, data: bytes, now: float, direction: Direction, title: str) -> list[int]:
         """Return what a main frame holds; nothing: it is an extra one, or malformed, and told."""
         main, extra = self._parameters[direction]
         if len(data) == EXTRA_LENGTH:
-            self.tell(now, direction, _CYCLIC, title, extra, raws_of(extra, decode_extra(data)))
+            self.report(now, direction, _CYCLIC, title, extra, raws_of(extra, decode_extra(data)))
             return []
         content = self.decoded(self._decode_main, data, now, direction, _CYCLIC, title)
         return [] if content is None else raws_of(main, (content.word, *content.values))
@@ -132,7 +132,7 @@ class CannordObserver(DriveObserver):
             remark = frame_sentences.fewer_values(len(raws) - 1, needed - 1, remark)
         if latency != latency and is_faulted(word):     # NaN: nobody asked
             verdict, remark = Verdict.NORMAL, frame_sentences.said_unasked(remark)
-        self.tell(now, _RESPONSE, _CYCLIC, title, parameters, raws, verdict=verdict,
+        self.report(now, _RESPONSE, _CYCLIC, title, parameters, raws, verdict=verdict,
                   remark=remark, latency=latency)
 
     # -- parameters -------------------------------------------------------------------------------

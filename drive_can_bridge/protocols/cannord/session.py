@@ -106,7 +106,7 @@ class CannordSession(Session):
                                      in_turn=not group.alone)
         group.join(GroupMember(self, request_identifier, self._answers, self._samples))
         self._cycles = self._answers if self._led else group.exchange
-        self.look_after(self._cycles, channel=self._channel)
+        self.set_parts(self._cycles, channel=self._channel)
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -114,10 +114,10 @@ class CannordSession(Session):
         self._cycles.stop()
         self._forget_samples()
         self._group.forget(self)
-        owed = self.duty.happened(Happened.STARTED) is Do.STOP
+        stop_pending = self.duty.happened(Happened.STARTED) is Do.STOP
         if not self._led:   # its cycles are for all
             self._group.exchange.start(now)
-            if owed:
+            if stop_pending:
                 self._group.exchange.timer.hurry(now)
 
     def prepare_stop(self, now: float) -> bool:
@@ -147,9 +147,9 @@ class CannordSession(Session):
 
     # -- process data, sending --------------------------------------------------------------------
 
-    def see_to_control_word(self, now: float) -> None:
+    def update_control_word(self, now: float) -> None:
         if not self._led:
-            self._group.exchange.hurry(now, setpoints=self.owed)
+            self._group.exchange.hurry(now, setpoints=self.stop_pending)
 
     def exchange_missed(self, reason: Sentence, now: float) -> None:
         self._answers.lose(reason, now)
@@ -203,7 +203,7 @@ class CannordSession(Session):
             return
         if not self.online and self.stage is Stage.RUNNING:
             self.be_online()
-            self._timeout.look(now)
+            self._timeout.poll(now)
             self._group.found(self)
         if asked and self._faulted and not self._machine.fault:
             answers.book.stale = 1      # it may have been told unasked: then the answer follows

@@ -17,7 +17,7 @@ _COMMANDS = {command.value: command.name.lower().replace('_', ' ')
              for command in network.NmtCommand}
 
 
-def hear_node(observer: DriveObserver, node: int, booted: Callable[[], None],
+def listen_to_node(observer: DriveObserver, node: int, booted: Callable[[], None],
               timeout: float) -> None:
     """
     Report heartbeats, answers to node guarding and emergency messages of a node.
@@ -26,33 +26,33 @@ def hear_node(observer: DriveObserver, node: int, booted: Callable[[], None],
     :param timeout: s that an answer to node guarding may take.
     """
     def lose(now: float) -> None:
-        observer.tell(now, _RESPONSE, _NETWORK, 'node guarding', verdict=Verdict.LOST,
+        observer.report(now, _RESPONSE, _NETWORK, 'node guarding', verdict=Verdict.LOST,
                       remark='no answer')
     guarding = AnswerWatch(observer, timeout, lose)
 
     def take_guarding(_: bytes, now: float) -> None:
-        observer.tell(now, _REQUEST, _NETWORK, 'node guarding', remark='request')
+        observer.report(now, _REQUEST, _NETWORK, 'node guarding', remark='request')
         guarding.ask(now)
 
     def take_heartbeat(state: NmtState, now: float) -> None:
         if state is NmtState.BOOT_UP:
             booted()
-            observer.tell(now, _RESPONSE, _NETWORK, 'boot-up', verdict=Verdict.SUSPICIOUS,
+            observer.report(now, _RESPONSE, _NETWORK, 'boot-up', verdict=Verdict.SUSPICIOUS,
                           remark=frame_sentences.device_started())
         else:
             latency = guarding.answer(now)
             title = 'node guarding' if latency == latency else 'heartbeat'  # NaN: of itself
-            observer.tell(now, _RESPONSE, _NETWORK, title, remark=state.text, latency=latency)
+            observer.report(now, _RESPONSE, _NETWORK, title, remark=state.text, latency=latency)
 
     def take_emergency(emergency: Emergency, now: float) -> None:
         over = emergency.code == network.NO_ERROR
-        observer.tell(now, _RESPONSE, _NETWORK, 'emergency', remark=emergency.text,
+        observer.report(now, _RESPONSE, _NETWORK, 'emergency', remark=emergency.text,
                       verdict=Verdict.NORMAL if over else Verdict.SUSPICIOUS)
 
     observer.remote_handlers[network.HEARTBEAT_BASE + node] = take_guarding
-    observer.hear(network.HEARTBEAT_BASE + node, _RESPONSE, _NETWORK, 'heartbeat',
+    observer.listen(network.HEARTBEAT_BASE + node, _RESPONSE, _NETWORK, 'heartbeat',
                   network.decode_heartbeat, take_heartbeat)
-    observer.hear(network.EMERGENCY_BASE + node, _RESPONSE, _NETWORK, 'emergency',
+    observer.listen(network.EMERGENCY_BASE + node, _RESPONSE, _NETWORK, 'emergency',
                   network.decode_emergency, take_emergency)
 
 
@@ -66,7 +66,7 @@ class NmtObserver(DriveObserver):
     def __init__(self, nodes: dict[int, str], emit: Emit) -> None:
         super().__init__('', emit)
         self._nodes = nodes
-        self.hear(network.NMT_IDENTIFIER, _REQUEST, _NETWORK, 'NMT', network.decode_nmt,
+        self.listen(network.NMT_IDENTIFIER, _REQUEST, _NETWORK, 'NMT', network.decode_nmt,
                   self._take)
 
     def _take(self, told: tuple[int, int], now: float) -> None:

@@ -13,7 +13,7 @@ from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
-from drive_can_bridge.protocols.canopen.observer import hear_node
+from drive_can_bridge.protocols.canopen.observer import listen_to_node
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, PkwLayout, PkwMessage
@@ -33,12 +33,12 @@ class PkwObserver(DriveObserver):
         super().__init__(drive.name, emit)
         options = drive.options
         self._abort_order: str = options.abort_code_order
-        hear_node(self, drive.station, self._booted, drive.parameter_timeout)
+        listen_to_node(self, drive.station, self._booted, drive.parameter_timeout)
         decode = partial(pkw.decode, layout=PkwLayout(options.layout))
         for identifier, direction, title, take in (
                 (options.request_cob_id, _REQUEST, 'PKW request', self._take_request),
                 (options.response_cob_id, _RESPONSE, 'PKW response', self._take_response)):
-            self.hear(identifier, direction, _PARAMETER, title, decode, take)
+            self.listen(identifier, direction, _PARAMETER, title, decode, take)
         placement = self._placement = Placement.of(drive)
         self._spans = listed_by(
             drive.profile.parameters.values(), lambda parameter: (
@@ -56,7 +56,7 @@ class PkwObserver(DriveObserver):
         self._last_byte = message.function_byte
         if message.code == Function.NONE:
             self._requests.round.prelude = now
-            self.tell(now, _REQUEST, _PARAMETER, 'idle request')
+            self.report(now, _REQUEST, _PARAMETER, 'idle request')
             return
         asked = self._meant(message, now, _REQUEST, 'PKW request')
         if asked is None:
@@ -67,14 +67,14 @@ class PkwObserver(DriveObserver):
 
     def _take_response(self, message: PkwMessage, now: float) -> None:
         if message.code == Function.NONE:
-            self.tell(now, _RESPONSE, _PARAMETER, 'idle response')
+            self.report(now, _RESPONSE, _PARAMETER, 'idle response')
             return
         refused = message.code == Function.ERROR
         known = self._requests.about
         key = _key(message) if not refused else next(
             (key for key in reversed(known) if pkw.answers(message, key)), None)
         if key is None:
-            self.tell(now, _RESPONSE, _PARAMETER, 'PKW response', verdict=Verdict.UNASKED,
+            self.report(now, _RESPONSE, _PARAMETER, 'PKW response', verdict=Verdict.UNASKED,
                       remark=f'{message}: {self._refusal(message)}')
             return
         asked = known.get(key) or self._meant(message, now, _RESPONSE, 'PKW response')
@@ -90,7 +90,7 @@ class PkwObserver(DriveObserver):
         """Return what a message is about; None: its function does not exist, which was told."""
         meaning = message.meaning
         if meaning is None:
-            self.tell(now, direction, _PARAMETER, title, verdict=Verdict.MALFORMED,
+            self.report(now, direction, _PARAMETER, title, verdict=Verdict.MALFORMED,
                       remark=frame_sentences.unknown_function_code(message.code))
             return None
         return RequestContent(Span(message.address, meaning.count), meaning.writes)

@@ -75,7 +75,7 @@ class RegisterAccess(ParameterAccess[Span, Step, Reply]):
 # -- what the drive is told -----------------------------------------------------------------------
 
 
-def tell(duty: StopDuty, channel: Hashable, write: RegisterWrite, *, runs: bool,
+def command(duty: StopDuty, channel: Hashable, write: RegisterWrite, *, runs: bool,
          ) -> Procedure[Reply]:
     """
     Write a setpoint or control word, and keep the books of what the drive was told.

@@ -42,9 +42,9 @@ class Rounds:
         self.refusals: dict[Span, Sentence] = {}
         self._words: dict[Address, int] = {}    # those of refused registers are missing
         self._plan: list[Span] = []
-        self.start_over()
+        self.restart()
 
-    def start_over(self) -> None:
+    def restart(self) -> None:
         """Forget what was refused."""
         self.gap = NOTHING
         self.refusals.clear()

@@ -40,7 +40,7 @@ class CanopenScanner(Scanner):
         self._questions += [sdo.encode_upload(node, sdo.DEVICE_TYPE, 0)
                             for node in range(1, network.NODE_MAX + 1)]
 
-    def hear_request(self, frame: Frame, now: float) -> None:
+    def receive_request(self, frame: Frame, now: float) -> None:
         base, node = frame.identifier & 0x780, frame.identifier & 0x7F
         if base == network.REQUEST_BASE:
             self._request(node, frame.data, now)
@@ -48,7 +48,7 @@ class CanopenScanner(Scanner):
             self._request(node, frame.data, now,
                           service=int.from_bytes(frame.data[1:4], 'little'))
 
-    def hear(self, frame: Frame, now: float) -> None:
+    def receive(self, frame: Frame, now: float) -> None:
         if frame.extended:
             return
         base, node = frame.identifier & 0x780, frame.identifier & 0x7F
@@ -63,10 +63,10 @@ class CanopenScanner(Scanner):
             elif base == sdo.RESPONSE_BASE:
                 self._take_upload(node, sdo.decode_upload(frame.data), now)
             elif base == sdo.REQUEST_BASE and len(frame.data) == 8:
-                self.hear_request(frame, now)
+                self.receive_request(frame, now)
                 self.master = frame_sentences.sdo_requests_to(node)
             elif base == network.REQUEST_BASE and len(frame.data) == 8:
-                self.hear_request(frame, now)
+                self.receive_request(frame, now)
             elif base == network.RESPONSE_BASE and len(frame.data) == 8:
                 if self._answer(node, 'PKW answers', now, lambda request: _repeats(
                         request, frame.data)) and node in self.sightings:

@@ -90,7 +90,7 @@ class PkwSession(Session):
         self.services = DriveServices(
             self, procedures.RegisterAccess(self._channel, self.retry, placement))
         self._lifecycle = Lifecycle(self._channel)
-        self.look_after(
+        self.set_parts(
             self._lifecycle, HeartbeatWatch(self, self._node), channel=self._channel,
             behind_control=[ExpiryWatch(self, self._writers)])
 
@@ -119,7 +119,7 @@ class PkwSession(Session):
     def begin(self, now: float) -> None:
         self.report.guess(sentences.looked_for())
         self._forget_exchange()
-        self._rounds.start_over()
+        self._rounds.restart()
         self._node.begin(now)
         self._look_for_it(now, now)
         self._begin_rounds(now)
@@ -271,7 +271,7 @@ class PkwSession(Session):
 
     def _end_futile_stop(self, now: float) -> None:
         """End a stop that was for safety only, of a node that takes no PDOs any more."""
-        if now < self._node.free_at and not self.owed:
+        if now < self._node.free_at and not self.stop_pending:
             self.stop_ended()
 
     # -- what the device is told ------------------------------------------------------------------
@@ -279,7 +279,7 @@ class PkwSession(Session):
     def hand_out_neutral(self, now: float) -> None:
         self._writers.write_all_setpoints(now)
 
-    def see_to_control_word(self, now: float) -> None:
+    def update_control_word(self, now: float) -> None:
         if self.online:
             self._writers.write_control(now, known=self._rounds.blank)
 
@@ -304,7 +304,7 @@ class PkwSession(Session):
             self._offline_traffic.came(now)
         try:
             if identifier == options.response_cob_id:
-                self._writers.again.heard(now)
+                self._writers.again.sign_of_life(now)
                 self._exchange.received_at = now - age
                 message = pkw.decode(data, self._layout)
                 if not self._channel.receive(message, now):
@@ -313,7 +313,7 @@ class PkwSession(Session):
                     self.report.unasked(sentences.unasked_pkw(str(message)), late, now)
             elif self._node_says(identifier, data, now):
                 self._end_futile_stop(now)
-                self._writers.again.heard(now, hurry=True)
+                self._writers.again.sign_of_life(now, hurry=True)
             elif identifier == options.request_cob_id:
                 self.report.note(ForeignMasterSeen(sentences.other_master_asks_node(
                     self.configuration.station, 'PKW requests', str(frame))))
@@ -341,10 +341,10 @@ class PkwSession(Session):
         if now >= self._round_due:
             self._writers.round_begins()
             if self.control is not None and self.control.stopping:
-                self.see_to_control_word(now)   # before setpoints, should it be due again
+                self.update_control_word(now)   # before setpoints, should it be due again
             if self.online:
                 self._writers.write_setpoints(now)
-                self.see_to_control_word(now)
+                self.update_control_word(now)
             self._exchange.begin(now)
 
     @property

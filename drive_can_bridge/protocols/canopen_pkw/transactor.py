@@ -177,7 +177,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
             self._send_step(step, now)
         elif not self._synchronised:
             self._prepare(pkw.idle_request(), now)
-        elif self._is_doubtful(step, now):
+        elif self._is_ambiguous(step, now):
             self._ask_aside(step, now)
         elif self._next_toggle(step, now) != self._toggle:
             self._send_step(step, now)
@@ -281,13 +281,13 @@ class MailboxTransactor(Transactor[Step, Reply]):
                 self._given_up = deque(
                     (each for each in self._given_up if each[1].address != step.address),
                     maxlen=ASKED_MAX)
-        elif self._is_doubtful(step, now):
+        elif self._is_ambiguous(step, now):
             self._ask_aside(step, now)
             return True
         self._send_step(step, now)
         return True
 
-    def _is_doubtful(self, step: Step, now: float) -> bool:
+    def _is_ambiguous(self, step: Step, now: float) -> bool:
         """Return whether answers to given-up writes would make more than the next one doubtful."""
         if isinstance(step, RegisterRead) or step.blind:
             return False

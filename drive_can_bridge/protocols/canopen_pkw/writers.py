@@ -32,7 +32,7 @@ from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import CONTROL_WORD
 from drive_can_bridge.protocols.acyclic_output import Acknowledged, AcyclicOutput
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
-from drive_can_bridge.protocols.canopen_pkw.procedures import tell, write_blind_until_answered
+from drive_can_bridge.protocols.canopen_pkw.procedures import command, write_blind_until_answered
 from drive_can_bridge.protocols.canopen_pkw.transactor import (
     MailboxChannel, Procedure, RegisterRead, RegisterWrite, Reply, Step)
 from drive_can_bridge.protocols.channel import Priority, STOP_PATIENCE
@@ -117,7 +117,7 @@ class Writers:
         items = self._setpoints.items
         if not items:
             return
-        self._output.look([setpoint.raw for setpoint in items], now, hold=hold, unknown=[
+        self._output.collect_due([setpoint.raw for setpoint in items], now, hold=hold, unknown=[
             index for index, setpoint in enumerate(items) if not setpoint.known])
         if self._output.waiting and self._channel.is_idle(Priority.SETPOINTS):
             self._channel.run(self._write_setpoints(), lambda _: None, now, Priority.SETPOINTS)
@@ -175,7 +175,7 @@ class Writers:
     def _write_setpoint(self, index: int) -> Procedure[bool]:
         """Write one as it is then; tell whether it was neutral."""
         setpoint = self._setpoints.items[index]
-        raw, reply = yield from self._tell_setpoint(index, setpoint)
+        raw, reply = yield from self._command_setpoint(index, setpoint)
         neutral = raw == setpoint.neutral and not setpoint.parameter.limit
         if isinstance(reply, Silence):
             self._output.failed(index)
@@ -195,10 +195,10 @@ class Writers:
             self._session.neutral_stop.left(setpoint.parameter.name)
             self._session.neutral_stop.answered()
         if self._output.has(index):
-            self._session.see_to_control_word(self._channel.now)
+            self._session.update_control_word(self._channel.now)
         return neutral
 
-    def _tell_setpoint(self, index: int, setpoint: Setpoint) -> Procedure[tuple[int, Reply]]:
+    def _command_setpoint(self, index: int, setpoint: Setpoint) -> Procedure[tuple[int, Reply]]:
         """
         Write one until it is answered, or is not to be repeated.
 
@@ -214,7 +214,7 @@ class Writers:
             write = RegisterWrite.of(
                 self._placement, setpoint.parameter, raw, blind=alone,
                 timeout=min(self._patience, timeout) if alone and left > 0 else timeout)
-            reply = yield from tell(
+            reply = yield from command(
                 self._session.duty, index, write, runs=raw != setpoint.neutral)
             if not isinstance(reply, Silence):
                 self._patience = max(STOP_PATIENCE, 2.0 * (self._channel.now - since))
@@ -236,7 +236,7 @@ class Writers:
         control, now = session.control, self._channel.now
         if self._warned.get(name) != text:  # once: commands may go to and fro
             session.report.warn(sentences.write_failed(text),
-                                may_run=neutral and control is None and session.owed)
+                                may_run=neutral and control is None and session.stop_pending)
         self._warned[name] = self._failures[name] = text
         if control is None:
             return
@@ -256,7 +256,7 @@ class Writers:
         word, output = control.word, self._output
         if not output.wants(self._slot, word, now) and not output.word_due(now):
             return
-        repeated = output.told(self._slot) == word or control.operating
+        repeated = output.last_written(self._slot) == word or control.operating
         if repeated and not known and word != control.table.disable:
             return
         if control.stopping and word != output.word:    # once for each stop
@@ -270,7 +270,7 @@ class Writers:
         output, unanswered = self._output, 0
         while not output.holds_word():
             word, stopping = control.word, control.stopping
-            if word == output.word and output.told(self._slot) is None and not stopping:
+            if word == output.word and output.last_written(self._slot) is None and not stopping:
                 there = yield from self._read_back(parameter, word)
                 if there is None:
                     return
@@ -285,7 +285,7 @@ class Writers:
             again = stopping and unanswered < STOP_ATTEMPTS - 1
             timeout = min(STOP_PATIENCE, self._session.retry.timeout) if again else None
             output.written(self._slot, word, self._channel.now)
-            reply = yield from tell(
+            reply = yield from command(
                 self._session.duty, CONTROL_WORD,
                 RegisterWrite.of(self._placement, parameter, word, blind=stopping,
                                  timeout=timeout),
@@ -297,7 +297,7 @@ class Writers:
                     output.word_refused(word, self._channel.now)
                 if word == control.word and not again:
                     if stopping:
-                        self._tell_silence(parameter, word)
+                        self._warn_of_silence(parameter, word)
                     return
                 continue
             if isinstance(reply, Refused):
@@ -336,12 +336,12 @@ class Writers:
         control.word_refused(word, reason, now)
         self._session.control_changed(now)
 
-    def _tell_silence(self, parameter: Parameter, word: int) -> None:
+    def _warn_of_silence(self, parameter: Parameter, word: int) -> None:
         """Warn that a word that stops the drive is not acknowledged, once until one is."""
         text = sentences.write_unanswered(f'{parameter.name} {word:04X}h')
         if text != self._word_refusal:
             self._session.report.warn(
-                sentences.write_failed(text), may_run=self._session.owed)
+                sentences.write_failed(text), may_run=self._session.stop_pending)
         self._word_refusal = text
 
     # -- stopping ---------------------------------------------------------------------------------
@@ -371,7 +371,7 @@ class Writers:
         ends = not self._session.active
         self._stop.begin(write_until_answered(writes, lambda each: write_blind_until_answered(
             self._placement, each, timeout, timeout if ends else patience)),
-            now, insist=ends, again=again)
+            now, always_report=ends, again=again)
 
     def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Step, Reply]:
         span = self._placement.span(status)

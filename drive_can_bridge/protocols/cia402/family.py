@@ -153,7 +153,7 @@ class Cia402(Family):
             name=name, type=ParameterType.UINT32, index=place[0], subindex=place[1], listed=False,
             width_known=False)
 
-    def tells_enabled(self, drive: DriveConfiguration) -> tuple[Parameter, Callable[[int], bool]]:
+    def enabled_status(self, drive: DriveConfiguration) -> tuple[Parameter, Callable[[int], bool]]:
         return STATUS_PARAMETER, lambda word: state_of(word) in MOVING
 
     def parts(self) -> FamilyParts:

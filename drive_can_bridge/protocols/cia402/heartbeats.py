@@ -88,7 +88,7 @@ class HeartbeatSender:
         interval = self._session.configuration.options.bridge_heartbeat
         gap = self._heartbeat.gap(now)
         if gap > (WATCH_INTERVALS - 0.5) * interval:
-            timing.tell('bridge_heartbeat', sentences.longer_beat_would_hold(
+            timing.report_once('bridge_heartbeat', sentences.longer_beat_would_hold(
                 gap=gap, interval=enough(gap / WATCH_INTERVALS)))
         else:
-            timing.tell('1016h', sentences.beats_were_sent(gap=gap))
+            timing.report_once('1016h', sentences.beats_were_sent(gap=gap))

@@ -151,7 +151,7 @@ class Homing:
             self._go(HomingStep.ENTERING)
             self._change(states.HOMING_MODE, self._entered)
         elif step is HomingStep.RUNNING and not self._machine.word_due:
-            self._look(status)
+            self._advance(status)
         elif step is HomingStep.LATCHING:
             self._latch(raws, behind)
         elif step is HomingStep.HOLDING and behind:
@@ -163,7 +163,7 @@ class Homing:
     def _go(self, step: HomingStep) -> None:
         self._step, self._fresh = step, False
 
-    def _look(self, status: int) -> None:
+    def _advance(self, status: int) -> None:
         """Look for the end in a status behind the start."""
         self._answers += 1
         if self._answers == 1:

@@ -71,7 +71,7 @@ class LimitCheck:
         self._limits = [_Limit(each, sent.parameters.index(each)) for each in limits]
         self._sent, self._channel, self._judged = sent, channel, judged
         self._open: list[_Limit] = []
-        self._looking: _Limit | None = None
+        self._polling: _Limit | None = None
         self._stuck: _Limit | None = None
 
     def found(self, words: dict[Parameter, int]) -> Sentence:
@@ -90,14 +90,14 @@ class LimitCheck:
 
     def begin(self) -> None:
         """Begin to look: exchanges follow."""
-        self._looking = None
+        self._polling = None
         for limit in self._limits:
             limit.looked_for, limit.over, limit.otherwise = None, False, NOTHING
         self._open = list(self._limits)
 
     def stop(self) -> None:
         """Look at nothing any more: the channel was cleared."""
-        self._looking = None
+        self._polling = None
         self._open = []
 
     @property
@@ -113,20 +113,20 @@ class LimitCheck:
 
     def answered(self, now: float) -> None:
         """Look at what was sent with an exchange that the drive has answered."""
-        if not self._open or self._looking is not None:     # all that most cycles pay
+        if not self._open or self._polling is not None:     # all that most cycles pay
             return
         for limit in self._open:
             word = self._word(limit)
             if word is not None and word != limit.looked_for:
-                self._looking = limit
-                self._channel.run(self._look(limit), self._looked, now)
+                self._polling = limit
+                self._channel.run(self._poll(limit), self._polled, now)
                 return
 
     def _word(self, limit: _Limit) -> int | None:
         raw = self._sent.raws[limit.place]
         return None if raw is None else limit.parameter.word_from_raw(raw)
 
-    def _look(self, limit: _Limit) -> Procedure[None]:
+    def _poll(self, limit: _Limit) -> Procedure[None]:
         """Read one until it shows what is sent, or for so long that it never will."""
         parameter, tried, until = limit.parameter, set[int](), math.inf
         length = pdo.width(parameter)
@@ -161,7 +161,7 @@ class LimitCheck:
             limit.over = True
             self._stuck, self.without_effect = limit, sentences.limit_without_effect(*said)
 
-    def _looked(self, _: None) -> None:
-        self._looking = None
+    def _polled(self, _: None) -> None:
+        self._polling = None
         self._open = [each for each in self._open if not each.over]
         self._judged()

@@ -78,14 +78,14 @@ class NodeSetUp:
         objects = self._objects = ObjectAccess(drive.parameter_retries + 1)
         self._transfer, self._read = objects.transfer, objects.read
         self._put, self._must = objects.put, objects.must
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         self.moving: ServoState | None = None
         self._found = NOTHING           # what was told of a drive that runs
         self.options: dict[int, int] = {}
         self.nmt_at = self.started_at = -math.inf
         self.forget(-math.inf)
-        self.watch = BridgeWatch(objects, drive, self.tell)
-        self._pdos = PdoSetUp(objects, drive, self._may_write, self.tell)
+        self.watch = BridgeWatch(objects, drive, self.report_once)
+        self._pdos = PdoSetUp(objects, drive, self._may_write, self.report_once)
 
     def forget(self, now: float) -> None:
         """Know nothing of the state of the drive."""
@@ -109,30 +109,30 @@ class NodeSetUp:
         reply = yield Transfer(states.STATUS_WORD)
         if isinstance(reply, Silence):
             if self._node.heard_at > self._asked_at:
-                yield from self._tell_blindly(attempts=1)
+                yield from self._stop_blindly(attempts=1)
             return SetUpOutcome(SetUpState.ABSENT)
         try:
             yield from self._stand_still(reply)
             yield from self._learn()
             yield from self._heartbeat()
             if self._options.mapping != 'assume':
-                yield from self._look_at_objects(reply)
+                yield from self._check_objects(reply)
                 yield from self._exchange()
             yield from self._interpolation_time()
             yield from self._choose_mode()
             yield from self.watch.set_up()
-            yield from self._beats()
+            yield from self._await_heartbeats()
             yield from self._start()
             yield from self._find_axes()
-            status = yield from self._once_more()
+            status = yield from self._check_again()
         except SetUpEnd as end:
             return end.outcome
         return SetUpOutcome(SetUpState.READY, status=status)
 
-    def _once_more(self) -> Procedure[int]:
+    def _check_again(self) -> Procedure[int]:
         """Look again at what nobody looked at meanwhile; return the status word."""
         while True:
-            yield from self._beats()
+            yield from self._await_heartbeats()
             status = yield from self._stand_still(
                 (yield from self._transfer(Transfer(states.STATUS_WORD))))
             if not self._node.ceased:
@@ -140,10 +140,10 @@ class NodeSetUp:
 
     # -- one object -------------------------------------------------------------------------------
 
-    def tell(self, text: Sentence, *, warning: bool = True) -> None:
+    def report_once(self, text: Sentence, *, warning: bool = True) -> None:
         """Report once what the drive lacks, if anything."""
-        if text and text not in self._told:
-            self._told.add(text)
+        if text and text not in self._reported:
+            self._reported.add(text)
             self._session.report.note(Noted(text, warning=warning))
 
     # -- the steps --------------------------------------------------------------------------------
@@ -159,7 +159,7 @@ class NodeSetUp:
         until = self._channel.now + self._drive.control_timeout
         while True:
             if isinstance(reply, Refused):
-                yield from self._tell_blindly()
+                yield from self._stop_blindly()
                 raise differs(sentences.object_refused(
                     at_object(states.STATUS_WORD), reply.meaning))
             raw = reply.number(2)
@@ -197,7 +197,7 @@ class NodeSetUp:
         self._session.duty.happened(Happened.STOPPED)
         return raw
 
-    def _tell_blindly(self, attempts: int | None = None) -> Procedure[None]:
+    def _stop_blindly(self, attempts: int | None = None) -> Procedure[None]:
         """Stop a drive whose state nobody knows, before SYNC begins."""
         producer = self._producer
         if producer is not None and not producer.opened and self._stopped_at == math.inf:
@@ -210,7 +210,7 @@ class NodeSetUp:
         standstill = self._rules.standstill
         standstill.quick_stop_option = yield from self._read(
             states.QUICK_STOP_OPTION, 0, 2, signed=True)
-        yield from standstill.look(self._channel, sampled=False)
+        yield from standstill.poll(self._channel, sampled=False)
         return not standstill.holds
 
     def _learn(self) -> Procedure[None]:
@@ -221,7 +221,7 @@ class NodeSetUp:
                 self.options.pop(index, None)
             else:
                 self.options[index] = value
-                self.tell(stop_options.unknown(index, value))
+                self.report_once(stop_options.unknown(index, value))
             self._rules.standstill.quick_stop_option = self.options.get(states.QUICK_STOP_OPTION)
 
     def learn_again(self) -> Procedure[None]:
@@ -248,11 +248,11 @@ class NodeSetUp:
             return
         if absent or found and found >= 1000 * node.heartbeat_timeout:
             node.heartbeat_timeout = 0.0
-            self.tell(sentences.no_heartbeat_producer())
+            self.report_once(sentences.no_heartbeat_producer())
         else:       # it may send them as it is
-            self.tell(refusal)
+            self.report_once(refusal)
 
-    def _look_at_objects(self, status: Reply) -> Procedure[None]:
+    def _check_objects(self, status: Reply) -> Procedure[None]:
         """See that all is there that is to be mapped, and that limits are not without effect."""
         drive = self._drive
         without_effect = self._limits.found((yield from read_mapped(
@@ -260,7 +260,7 @@ class NodeSetUp:
         if without_effect:
             raise differs(without_effect)
 
-    def _beats(self) -> Procedure[None]:
+    def _await_heartbeats(self) -> Procedure[None]:
         """Wait for heartbeats that have ceased: it would be online again, and not watched."""
         if self._node.ceased:
             self._session.report.advise(sentences.no_heartbeat(self._node.heartbeat_timeout))
@@ -358,7 +358,7 @@ class NodeSetUp:
             return
         fitting = interpolation_time(period)
         if fitting is None:
-            self.tell(sentences.interpolation_time_left(period))
+            self.report_once(sentences.interpolation_time_left(period))
             return
         count, power = fitting
         if (value, (yield from self._read(index, 2, 1, signed=True))) == fitting:
@@ -366,7 +366,7 @@ class NodeSetUp:
         refusal = (yield from self._put(index, 2, power, 1)) or (
             yield from self._put(index, 1, count, 1))
         if refusal:
-            self.tell(refusal)
+            self.report_once(refusal)
 
     # -- how PDOs travel --------------------------------------------------------------------------
 
@@ -404,7 +404,7 @@ class NodeSetUp:
                 at_object(SYNC_PERIOD), f'{period} us', f'{wanted} us'))
             yield from self._must(SYNC_PERIOD, 0, wanted, 4)
         if period:
-            self.tell(sentences.sync_watched(wanted, 0.5 * self._drive.period))
+            self.report_once(sentences.sync_watched(wanted, 0.5 * self._drive.period))
         counter = yield from self._read(SYNC_COUNTER, 0, 1)
         if (counter or 0) > 1:
             raise differs(sentences.object_differs(at_object(SYNC_COUNTER), str(counter), '0'))

@@ -18,7 +18,7 @@ from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.canopen.network import NmtState
-from drive_can_bridge.protocols.canopen.observer import hear_node, NmtObserver
+from drive_can_bridge.protocols.canopen.observer import listen_to_node, NmtObserver
 from drive_can_bridge.protocols.canopen.sdo import SdoCommand as Said, SdoMessage
 from drive_can_bridge.protocols.cia402.pdo import Pdo, request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.states import state_of
@@ -76,16 +76,16 @@ class Cia402Observer(DriveObserver):
         self._arrived: set[int] = set()
         self._told = False              # something since the last SYNC
         node = drive.station
-        hear_node(self, node, self._booted, drive.parameter_timeout)
-        self.hear(sdo.REQUEST_BASE + node, _REQUEST, _PARAMETER, 'SDO request',
+        listen_to_node(self, node, self._booted, drive.parameter_timeout)
+        self.listen(sdo.REQUEST_BASE + node, _REQUEST, _PARAMETER, 'SDO request',
                   partial(sdo.decode, _REQUEST), self._take_sdo_request)
-        self.hear(sdo.RESPONSE_BASE + node, _RESPONSE, _PARAMETER, 'SDO response',
+        self.listen(sdo.RESPONSE_BASE + node, _RESPONSE, _PARAMETER, 'SDO response',
                   lambda data: sdo.decode(_RESPONSE, data, segments=self._transfer is not None),
                   self._take_sdo_response)
         self.handlers |= {pdo.identifier: self._request_handler(pdo)
                           for pdo in request_pdos(drive)}
         for pdo in responses:
-            self.hear(pdo.identifier, _RESPONSE, _CYCLIC, 'cyclic response', pdo.unpack,
+            self.listen(pdo.identifier, _RESPONSE, _CYCLIC, 'cyclic response', pdo.unpack,
                       partial(self._take_response, pdo))
         self._cycle: CyclicWatch | None = None
         self._events: EventWatch | None = None
@@ -117,7 +117,7 @@ class Cia402Observer(DriveObserver):
             self._told = True
             raws = self.decoded(pdo.unpack, data, now, _REQUEST, _CYCLIC, 'cyclic request')
             if raws is not None:
-                self.tell(now, _REQUEST, _CYCLIC, 'cyclic request', pdo.parameters, raws)
+                self.report(now, _REQUEST, _CYCLIC, 'cyclic request', pdo.parameters, raws)
         return take
 
     def _take_response(self, pdo: Pdo, raws: Sequence[int], now: float) -> None:
@@ -130,7 +130,7 @@ class Cia402Observer(DriveObserver):
             elif self._events is not None:
                 self.due(self._events.complete(now))
         remark = state_of(raws[0]).value if pdo.parameters[0].name == STATUS_NAME else ''
-        self.tell(now, _RESPONSE, _CYCLIC, 'cyclic response', pdo.parameters, raws,
+        self.report(now, _RESPONSE, _CYCLIC, 'cyclic response', pdo.parameters, raws,
                   verdict=verdict, remark=remark, latency=latency)
 
     def _booted(self) -> None:
@@ -147,7 +147,7 @@ class Cia402Observer(DriveObserver):
         self._end_transfer(now)
         self._begun = place if request.kind is Said.DOWNLOAD_BEGUN else None
         if request.kind is Said.ABORT:
-            self.tell(now, _REQUEST, _PARAMETER, 'abort', self._content(place, None)[0],
+            self.report(now, _REQUEST, _PARAMETER, 'abort', self._content(place, None)[0],
                       remark=sdo.describe(request.number))
             return
         self._requests.ask(place, place, now, None if request.kind is Said.UPLOAD else [
@@ -175,7 +175,7 @@ class Cia402Observer(DriveObserver):
             return
         self._segments.ask(now)
         if request.kind is Said.SEGMENT_SENT and self._add(request):
-            self._tell_text(_REQUEST, now)
+            self._report_text(_REQUEST, now)
 
     def _take_segment(self, answer: SdoMessage, now: float) -> None:
         latency = self._segments.answer(now)
@@ -183,7 +183,7 @@ class Cia402Observer(DriveObserver):
         if last and self._transfer is not None:
             if self._writes:
                 self._text = b''
-            self._tell_text(_RESPONSE, now, latency if self._writes else math.nan)
+            self._report_text(_RESPONSE, now, latency if self._writes else math.nan)
             self._end_transfer(now)
 
     def _add(self, segment: SdoMessage) -> bool:
@@ -193,9 +193,9 @@ class Cia402Observer(DriveObserver):
         self._last = segment.last
         return segment.last
 
-    def _tell_text(self, direction: Direction, now: float, latency: float = math.nan) -> None:
+    def _report_text(self, direction: Direction, now: float, latency: float = math.nan) -> None:
         if self._transfer is not None:
-            self.tell(now, direction, _PARAMETER, 'write' if self._writes else 'read',
+            self.report(now, direction, _PARAMETER, 'write' if self._writes else 'read',
                       self._content(self._transfer, None)[0], latency=latency,
                       remark=printable(repr(self._text.rstrip(b'\0').decode(
                           'ascii', 'replace'))) if self._text else '')
@@ -203,7 +203,7 @@ class Cia402Observer(DriveObserver):
     def _lose_segment(self, now: float) -> None:
         if self._transfer is not None:
             self.observed.unanswered += 1
-            self.tell(now, _RESPONSE, _PARAMETER, 'write' if self._writes else 'read',
+            self.report(now, _RESPONSE, _PARAMETER, 'write' if self._writes else 'read',
                       self._content(self._transfer, None)[0], verdict=Verdict.LOST,
                       remark=frame_sentences.segment_unanswered())
 
@@ -236,7 +236,7 @@ class NetworkObserver(DriveObserver):
         self.handlers[network.SYNC_IDENTIFIER] = self._take_sync
         for drive in drives:
             if drive.options.bridge_heartbeat > 0:
-                self.hear(network.HEARTBEAT_BASE + drive.options.bridge_node, _REQUEST, _NETWORK,
+                self.listen(network.HEARTBEAT_BASE + drive.options.bridge_node, _REQUEST, _NETWORK,
                           'heartbeat', network.decode_heartbeat, self._take_bridge)
 
     def _take_sync(self, data: bytes, now: float) -> None:
@@ -244,11 +244,11 @@ class NetworkObserver(DriveObserver):
             each.synchronise(now)
             if each.deadline < self.deadline:
                 self.deadline = each.deadline
-        self.tell(now, _REQUEST, _CYCLIC, 'SYNC',
+        self.report(now, _REQUEST, _CYCLIC, 'SYNC',
                   remark=f'all nodes, counter {data[0]}' if data else 'all nodes')
 
     def _take_bridge(self, state: NmtState, now: float) -> None:
-        self.tell(now, _REQUEST, _NETWORK, 'heartbeat', remark=f'of the bridge: {state.text}')
+        self.report(now, _REQUEST, _NETWORK, 'heartbeat', remark=f'of the bridge: {state.text}')
 
 
 def make_observers(drives: Sequence[DriveConfiguration], emit: Emit) -> list[DriveObserver]:

@@ -26,19 +26,19 @@ class PdoSetUp:
         self._objects, self._drive, self._options = objects, drive, drive.options
         self._received, self._sent = request_pdos(drive), response_pdos(drive)
         self._synchronous: bool = drive.options.transmission == 'sync'
-        self._may_write, self._tell = may_write, tell
+        self._may_write, self._report = may_write, tell
 
     def set_up(self) -> Procedure[None]:
         """Compare them with the configuration, and write what differs, if that is wanted."""
         for wanted in self._received:
-            yield from self._look_at(wanted, transmit=False)
+            yield from self._check(wanted, transmit=False)
         for wanted in self._sent:
-            yield from self._look_at(wanted, transmit=True)
+            yield from self._check(wanted, transmit=True)
         if self._options.mapping == 'configure':
             yield from self._close(pdo.RPDO_COMMUNICATION, self._received)
             yield from self._close(pdo.TPDO_COMMUNICATION, self._sent)
 
-    def _look_at(self, wanted: Pdo, *, transmit: bool) -> Procedure[None]:
+    def _check(self, wanted: Pdo, *, transmit: bool) -> Procedure[None]:
         """Compare one PDO; write it where it differs, and compare again."""
         difference, identifier = yield from self._compare(wanted, transmit=transmit)
         if difference:
@@ -202,7 +202,7 @@ class PdoSetUp:
             if refusal and subindex == pdo.EVENT_TIMER:
                 return refusal
             if refusal:
-                self._tell(refusal)
+                self._report(refusal)
         return NOTHING
 
     def _close(self, first: int, used: Iterable[Pdo]) -> Procedure[None]:
@@ -217,7 +217,7 @@ class PdoSetUp:
                 self._may_write(_difference(at, pdo.COB_ID, identifier, identifier | pdo.INVALID))
                 refusal = yield from self._objects.put(at, pdo.COB_ID, identifier | pdo.INVALID, 4)
                 if refusal:
-                    self._tell(refusal)
+                    self._report(refusal)
 
 
 def _difference(index: int, subindex: int, found: int, wanted: int) -> Sentence:

@@ -61,16 +61,16 @@ class Cia402Scanner(Scanner):
         """Return the mode that moves nothing by itself and needs no short period."""
         return {'mode': 'pv'}
 
-    def hear(self, frame: Frame, now: float) -> None:
+    def receive(self, frame: Frame, now: float) -> None:
         base, node = frame.identifier & ~network.NODE_MAX, frame.identifier & network.NODE_MAX
         if frame.extended:
             return
         if frame.identifier == network.SYNC_IDENTIFIER or base in (pdo.RPDO_BASE, pdo.TPDO_BASE):
-            self._hear_cycle(frame, node)
+            self._receive_cycle(frame, node)
         elif base == sdo.RESPONSE_BASE and node:
-            self._hear_answer(frame, node)
+            self._receive_answer(frame, node)
 
-    def _hear_cycle(self, frame: Frame, node: int) -> None:
+    def _receive_cycle(self, frame: Frame, node: int) -> None:
         identifier, data, _ = frame
         word = int.from_bytes(data[:2], 'little')
         sync = identifier == network.SYNC_IDENTIFIER
@@ -87,7 +87,7 @@ class Cia402Scanner(Scanner):
             self._see(node, f'status word {word:04X}h ({told.value}), answered with SYNC',
                       Certainty.LIKELY)
 
-    def _hear_answer(self, frame: Frame, node: int) -> None:
+    def _receive_answer(self, frame: Frame, node: int) -> None:
         try:
             (index, subindex), value, _ = sdo.decode_upload(frame.data)
         except RemoteProtocolError:
@@ -99,16 +99,16 @@ class Cia402Scanner(Scanner):
                 if value >> 16 == _MODULES:
                     kind = 'drive, perhaps several axes, of which the first is driven,'
                 self._types[node] = f'device type {value:08X}h ({kind} of CiA 402)'
-                self._tell(node)
+                self._note(node)
                 self._ask_identity(node)
         elif index == sdo.IDENTITY and subindex in _IDENTITY and value is not None:
             self._identities.setdefault(node, {})[_IDENTITY[subindex]] = f'{value:X}h'
             # one that only looks like a drive of CiA 402 has not said so in 1000h
             if node in self.sightings and (
                     self.sightings[node].certainty is Certainty.CERTAIN):
-                self._tell(node)
+                self._note(node)
 
-    def _tell(self, node: int) -> None:
+    def _note(self, node: int) -> None:
         text = ', '.join((self._types[node], *(
             f'{name} {value}' for name, value in self._identities.get(node, {}).items())))
         self.nodes[node] = text

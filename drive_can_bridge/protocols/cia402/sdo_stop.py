@@ -49,11 +49,11 @@ class SdoStop:
         """How many s it takes at most beyond the attempts at each write."""
         return _ATTEMPTS_UNTIL_NMT * self._answer_time + NMT_TIME
 
-    def writes(self, writes: Sequence[StopWrite], *, unheard: bool = False) -> StopProcedure:
+    def writes(self, writes: Sequence[StopWrite], *, unanswered: bool = False) -> StopProcedure:
         """
         Stop it, each thing until it is acknowledged or was tried three times.
 
-        :param unheard: it was told by cycles, and has answered none.
+        :param unanswered: it was told by cycles, and has answered none.
         :return: what failed, in words.
         """
         began, nmt = self._channel.now, self._session.configuration.options.nmt_start
@@ -65,15 +65,16 @@ class SdoStop:
                             attempts=STOP_ATTEMPTS, timeout=self._timeout)
             if not each.is_word:
                 return (yield step), STOP_ATTEMPTS, NOTHING
-            reply, attempts = yield from self._word(replace(step, attempts=1), unheard=unheard)
+            reply, attempts = yield from self._word(
+                replace(step, attempts=1), unanswered=unanswered)
             hint = not nmt and self._may_be_stopped(began)
             return reply, attempts, sentences.node_may_be_stopped() if hint else NOTHING
         return write_until_answered(writes, write)
 
-    def _word(self, word: Transfer, *, unheard: bool) -> Procedure[tuple[Reply, int]]:
+    def _word(self, word: Transfer, *, unanswered: bool) -> Procedure[tuple[Reply, int]]:
         """Write the control word; return what became of it, and the number of attempts."""
         began, attempts = self._channel.now, 0
-        waited = began if unheard else began + _ATTEMPTS_UNTIL_NMT * self._answer_time
+        waited = began if unanswered else began + _ATTEMPTS_UNTIL_NMT * self._answer_time
         while True:
             may_be_stopped = self._may_be_stopped(began)
             due = self._said_stopped or may_be_stopped and self._channel.now > waited - _ROUNDING

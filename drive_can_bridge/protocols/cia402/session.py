@@ -147,7 +147,7 @@ class Cia402Session(Session):
         self._polls = StatePolls(
             self, control, self._rules, self._channel, self._node_set_up, self._homing)
         self._lifecycle = Lifecycle(self._channel)
-        self.look_after(
+        self.set_parts(
             self._lifecycle, self._heartbeats, HeartbeatWatch(self, self._node), self._homing,
             self.exchange, *([FreeSync(self, self._producer)] if self._synchronous else ()),
             channel=self._channel)
@@ -197,7 +197,7 @@ class Cia402Session(Session):
         self._runs_on = False
         if self.exchange.cycling:
             self.exchange.stop_soon(now)
-        elif self.owed:
+        elif self.stop_pending:
             self._stop_by_sdo(now)
         else:
             self._release(now)
@@ -219,9 +219,9 @@ class Cia402Session(Session):
         self._node.forget()
         super().bus_down(now, reason)
 
-    def stood_still(self, now: float) -> None:
+    def lose_after_stall(self, now: float) -> None:
         self._producer.shut()
-        super().stood_still(now)
+        super().lose_after_stall(now)
 
     # -- setting up -------------------------------------------------------------------------------
 
@@ -284,7 +284,7 @@ class Cia402Session(Session):
         if self.exchange.leaving:
             if self.exchange.cycles_left == 0:
                 self.duty.happened(Happened.SILENT)
-                self.start_over(now)
+                self.restart(now)
         elif reason and not self.online and self._node_set_up.starting(now):
             self._answers.forget()
             if not self._synchronous:
@@ -371,7 +371,7 @@ class Cia402Session(Session):
                 self._receive_pdo(place, data, now, now - age)
             elif identifier == sdo.RESPONSE_BASE + self.configuration.station:
                 self._node.heard_at = now
-                self._again.heard(now)
+                self._again.sign_of_life(now)
                 self._channel.receive(data, now)
             elif identifier in self._masters:
                 node = self.configuration.station
@@ -444,18 +444,18 @@ class Cia402Session(Session):
             self._expect_set(now)
         if not self.online and self.stage is Stage.RUNNING:
             if exchange.leaving:    # it is back
-                self.start_over(now)
+                self.restart(now)
                 return
             self.be_online()
             self.duty.happened(Happened.ANSWERED)
         if self._handshake is not None:
-            self._handshake.look(raws[0], now)
+            self._handshake.update(raws[0], now)
         standstill = self._standstill
         standstill.status(raws[0], now)
         if standstill.watching:
             standstill.sampled(raws, now)
         self.interlock.status(raws[0], now)
-        self._polls.look(now)
+        self._polls.update(now)
         self.control_changed(now)
         self.interlock.measured(raws)
         self._homing.sampled(raws[0], raws, now)
@@ -490,7 +490,7 @@ class Cia402Session(Session):
                 and (self.online or not self._node_set_up.starting(now))):
             self._close(sentences.node_state(state.text), now, START_PERIOD)
         else:
-            self._again.heard(now, hurry=True)
+            self._again.sign_of_life(now, hurry=True)
 
     def _of_the_conversation(self, frame: Frame) -> bool:
         """Return whether a frame is for this node, which has restarted since it was made."""
@@ -500,8 +500,8 @@ class Cia402Session(Session):
 
     def _no_pdos_at_the_end(self, state: NmtState, now: float) -> None:
         """Stop a node by SDO, at the end, that takes no PDOs any more."""
-        if self.exchange.cycling and self.unshown and state is not NmtState.OPERATIONAL:
-            self.exchange.doubt_the_end()
+        if self.exchange.cycling and self.unacknowledged and state is not NmtState.OPERATIONAL:
+            self.exchange.mark_silent()
             self.exchange.stop()
             self._stop_by_sdo(now)
         elif state is NmtState.STOPPED and self._stop.running:
@@ -539,7 +539,7 @@ class Cia402Session(Session):
     def _limits_judged(self) -> None:
         now, limits = self._channel.now, self._limits
         if limits.otherwise:
-            self._node_set_up.tell(limits.otherwise)
+            self._node_set_up.report_once(limits.otherwise)
         if limits.without_effect and not self._see_to_limits(now):
             self.report.note(Noted(self.error, error=True))
         self._machine.rules_changed()
@@ -574,11 +574,11 @@ class Cia402Session(Session):
         else:
             self._homing.begin(request, now)
 
-    def see_to_control_word(self, now: float) -> None:
+    def update_control_word(self, now: float) -> None:
         if self.stage is Stage.STOPPING:
             return
         exchange, control = self.exchange, self._machine
-        exchange.hurry(now, setpoints=self.owed)
+        exchange.hurry(now, setpoints=self.stop_pending)
         if control.pending and control.word != exchange.word:   # one step of several
             exchange.timer.no_later(max(now, exchange.timer.began_at
                                         + exchange.timer.stop_spacing))
@@ -609,11 +609,11 @@ class Cia402Session(Session):
 
     # -- the stop ---------------------------------------------------------------------------------
 
-    def _stop_by_sdo(self, now: float, *, again: bool = False, unheard: bool = False) -> None:
+    def _stop_by_sdo(self, now: float, *, again: bool = False, unanswered: bool = False) -> None:
         """
         Write ``disable`` and neutral setpoints to their objects.
 
-        :param unheard: it was told by cycles, and has answered none.
+        :param unanswered: it was told by cycles, and has answered none.
         """
         if self._stop.running:
             return
@@ -622,11 +622,11 @@ class Cia402Session(Session):
             self._no_answer_comes(now)
         writes = [each._replace(raw=self._machine.word) if each.is_word else each
                   for each in self._stop.writes()]
-        self._stop.begin(self._see_it_stop(writes, unheard=unheard), now, again=again)
+        self._stop.begin(self._see_it_stop(writes, unanswered=unanswered), now, again=again)
 
-    def _see_it_stop(self, writes: list[StopWrite], *, unheard: bool) -> StopProcedure:
+    def _see_it_stop(self, writes: list[StopWrite], *, unanswered: bool) -> StopProcedure:
         """Stop it, and in the end look whether it has, as long as frames would go on."""
-        failed = yield from self._sdo_stop.writes(writes, unheard=unheard)
+        failed = yield from self._sdo_stop.writes(writes, unanswered=unanswered)
         if not failed and self.stage is Stage.STOPPING:
             state = yield from self._state_in_the_end()
             if state in states.MOVING:
@@ -646,7 +646,7 @@ class Cia402Session(Session):
             if known and state not in states.MOVING or self._channel.now >= self._stop_until:
                 return state
             if self._standstill.watching:
-                yield from self._standstill.look(self._channel, sampled=False)
+                yield from self._standstill.poll(self._channel, sampled=False)
             if self._standstill.holds:
                 yield Transfer(states.CONTROL_WORD, 0, bytes(2), timeout=self._stop.answer_time)
             yield Transfer(pause=POLL_PERIOD)
@@ -671,14 +671,14 @@ class Cia402Session(Session):
                 or self._rules.state and self._machine.word_due):
             self.exchange.cycles_left = 1   # it still brakes, or 0006h has not left
             return
-        unheard = self.unshown
-        self.exchange.doubt_the_end()
+        unanswered = self.unacknowledged
+        self.exchange.mark_silent()
         if self._rules.state in states.MOVING or self._rules.may_run:
             self.duty.channel(CYCLE, Happened.RUN_LEFT)
             self.duty.happened(Happened.SILENT)     # of what it should have done
         self.exchange.stop()
-        if unheard:
-            self._stop_by_sdo(now, unheard=True)
+        if unanswered:
+            self._stop_by_sdo(now, unanswered=True)
         else:
             self._release(now)
 
@@ -687,7 +687,7 @@ class Cia402Session(Session):
         why = NOTHING
         if self._answers.book.stop_shown and self._rules.state in states.MOVING:
             why = sentences.stop_failed([sentences.still_in_state(self._rules.state.value)])
-        if self.owed or self._runs_on:      # then it is to stop by itself
+        if self.stop_pending or self._runs_on:      # then it is to stop by itself
             self.stop_left(why)
             return
         self._channel.run(self._node_set_up.watch.release(self._stop.answer_time),
@@ -714,8 +714,8 @@ class Cia402Session(Session):
     # -- state ------------------------------------------------------------------------------------
 
     @property
-    def unshown(self) -> bool:
-        return super().unshown and not self._answers.book.stop_shown
+    def unacknowledged(self) -> bool:
+        return super().unacknowledged and not self._answers.book.stop_shown
 
     @property
     def state(self) -> DriveState:

@@ -40,20 +40,20 @@ class SetpointHandshake:
             each.parameter.index, each.parameter.subindex or 0) == (mode.index, mode.subindex))
         self._setpoint = setpoints.items[self._place]
         self._rules, self._timeout, self._report = rules, timeout, report
-        self._waits_since, self._told = math.inf, False
+        self._waits_since, self._reported = math.inf, False
         self._handed: int | None = None     # the drive was given this one
         self._doubted = False               # or another one, if that frame was lost
         self._rising = False                # bit 4 has yet to travel
         self._before = 0                    # the bits that travel until then
         self._settling = 0                  # status words until bit 12 is none of a cut edge
 
-    def look(self, status: int, now: float) -> None:
+    def update(self, status: int, now: float) -> None:
         """Go on by a status word, before the next control word is chosen."""
         rules, setpoint = self._rules, self._setpoint
         if state_of(status) is not ServoState.OPERATION_ENABLED:
             self._handed, self._rising, self._settling = None, False, 0
             rules.mode_bits, rules.halted = 0, False
-            self._waits_since, self._told = math.inf, False
+            self._waits_since, self._reported = math.inf, False
             return
         acknowledged = bool(status & states.BIT_12)
         self._settling = 0 if acknowledged else max(0, self._settling - 1)
@@ -90,11 +90,11 @@ class SetpointHandshake:
             acknowledged and self._new))
         if not waits:
             self._waits_since = math.inf
-            self._told = self._told and not (high and acknowledged)
+            self._reported = self._reported and not (high and acknowledged)
             return
         self._waits_since = min(self._waits_since, now)
-        if now >= self._waits_since + self._timeout and not self._told:
-            self._told = True
+        if now >= self._waits_since + self._timeout and not self._reported:
+            self._reported = True
             self._report.note(Noted(
                 sentences.target_not_acknowledged(self._timeout, int(high)), warning=True))
 

@@ -110,7 +110,7 @@ class Standstill:
     """
     What is known of the motion of one axis, and of its quick stop.
 
-    :ivar watching: it is to be known whether the axis stands; see :meth:`look`.
+    :ivar watching: it is to be known whether the axis stands; see :meth:`poll`.
     :ivar quick_stop_option: 605Ah; None: the drive has none.
     :ivar position: the newest 6064h; None: not known.
     :ivar band: that of 6064h since :meth:`begin`.
@@ -174,7 +174,7 @@ class Standstill:
             elif index == self._velocity_object:
                 self._take_velocity(raw, now)
 
-    def look(self, channel: SdoChannel, *, sampled: bool = True) -> Procedure[None]:
+    def poll(self, channel: SdoChannel, *, sampled: bool = True) -> Procedure[None]:
         """
         Read once what says whether the axis moves.
 

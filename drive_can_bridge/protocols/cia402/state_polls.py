@@ -41,38 +41,38 @@ class StatePolls:
 
     def ended(self, _: None = None) -> None:
         """Record that none is under way: it has ended, or the channel was cleared."""
-        self._looking = False
+        self._polling = False
 
-    def look(self, now: float) -> None:
+    def update(self, now: float) -> None:
         """Begin what is missing, by the state that the drive is in."""
         state, control = self._rules.state, self._control
         if state is not ServoState.OPERATION_ENABLED:
             self._mode_shown = None
         if not control.pending:
             self._error_code = None
-        if self._looking:
+        if self._polling:
             return
         if self._standstill.watching and not self._standstill.holds:
-            self._begin(self._look_at_axis(), now)
+            self._begin(self._poll_axis(), now)
         elif self._session.stage is not Stage.RUNNING:
             return      # at the end nothing else is asked
         elif state is ServoState.OPERATION_ENABLED and self._mode_shown != self._mode and (
                 not control.stopping and not self._homing.under_way):
-            self._begin(self._look_at_mode(), now)
+            self._begin(self._poll_mode(), now)
         elif control.pending and self._error_code is None and (
                 now > control.due - 0.5 * self._session.configuration.control_timeout):
-            self._begin(self._look_at_error(), now)
+            self._begin(self._poll_error(), now)
 
     def _begin(self, look: Procedure[None], now: float) -> None:
-        self._looking = True
+        self._polling = True
         self._channel.run(look, self.ended, now)
 
-    def _look_at_mode(self) -> Procedure[None]:
+    def _poll_mode(self) -> Procedure[None]:
         """Read 6061h until it shows the mode."""
         while self._rules.state is ServoState.OPERATION_ENABLED:
             reply = yield Transfer(states.MODE_SHOWN)
             if isinstance(reply, Refused) and reply.absent:
-                self._node_set_up.tell(sentences.mode_not_shown())
+                self._node_set_up.report_once(sentences.mode_not_shown())
                 self._mode_shown = self._mode       # nothing says otherwise
             elif isinstance(reply, ObjectRead) and reply.content:
                 self._mode_shown = reply.number(1, signed=True)
@@ -83,13 +83,13 @@ class StatePolls:
                 return
             yield Transfer(pause=POLL_PERIOD)
 
-    def _look_at_axis(self) -> Procedure[None]:
+    def _poll_axis(self) -> Procedure[None]:
         """Read what samples do not say as long as it is to be known whether the axis stands."""
         while self._standstill.watching and not self._standstill.holds:
-            yield from self._standstill.look(self._channel)
+            yield from self._standstill.poll(self._channel)
             yield Transfer(pause=POLL_PERIOD)
 
-    def _look_at_error(self) -> Procedure[None]:
+    def _poll_error(self) -> Procedure[None]:
         """Read 603Fh: why the drive is not enabled."""
         reply = yield Transfer(states.ERROR_CODE)
         self._error_code = reply.number(2) if isinstance(reply, ObjectRead) else -1

@@ -38,7 +38,7 @@ class BridgeWatch:
                  tell: Callable[..., None]) -> None:
         self.slot: int | None = None
         self.text = ''
-        self._objects, self._options, self._tell = objects, drive.options, tell
+        self._objects, self._options, self._report = objects, drive.options, tell
         self._attempts = drive.parameter_retries + 1
         self._received = request_pdos(drive)
         self._unsure = NOTHING      # why nobody knows whether the drive watches
@@ -70,24 +70,24 @@ class BridgeWatch:
         refused = self._refused(states.ABORT_CONNECTION_OPTION) if option is None else NOTHING
         alone = [each for each in (guarding, time_out) if each]
         for each in alone:
-            self._tell(each, warning=False)
+            self._report(each, warning=False)
         if time_out or alone and option != 0:
             self.text = '; '.join(alone)
         elif slot is None and self._unsure:
             self._unknown(self._unsure)
         elif slot is None or option == 0:
             self.text = 'nothing'
-            self._tell(sentences.nothing_stops())
+            self._report(sentences.nothing_stops())
         elif option is None:
             self._unknown(refused or 'no 6007h')
         else:
             self.text = (f'{in_words(states.ABORT_CONNECTION_OPTION, option)}, by '
                          f'{at_object(CONSUMER, slot)}')
-            self._tell(unknown(states.ABORT_CONNECTION_OPTION, option))
+            self._report(unknown(states.ABORT_CONNECTION_OPTION, option))
 
     def _unknown(self, why: str) -> None:
         self.text = f'not known ({why})'
-        self._tell(sentences.watch_unknown(why))
+        self._report(sentences.watch_unknown(why))
 
     def _refused(self, index: int, subindex: int = 0) -> Sentence:
         """Return why the object that was read last is not known; '' if the drive has none."""
@@ -141,11 +141,11 @@ class BridgeWatch:
             refusal = yield from self._objects.put(CONSUMER, slots[0], wanted, 4)
         if refusal:
             self.slot = before
-            self._tell(refusal)
+            self._report(refusal)
             return slots[0] if ours else None
         found = yield from self._objects.read(CONSUMER, slots[0])
         if found not in (None, wanted):     # acknowledged, and not taken
-            self._tell(sentences.object_differs(
+            self._report(sentences.object_differs(
                 at_object(CONSUMER, slots[0]), f'{found:08X}h', f'{wanted:08X}h'))
             return None
         return self.slot
@@ -157,7 +157,7 @@ class BridgeWatch:
                     raise differs(sentences.watch_too_short(
                         at_object(CONSUMER, place), entry & 0xFFFF, interval),
                         sentences.maps_to_correct)
-                self._tell(sentences.watch_stays(at_object(CONSUMER, place)))
+                self._report(sentences.watch_stays(at_object(CONSUMER, place)))
                 return place
         return None
 

@@ -41,7 +41,7 @@ class AcyclicSide:
 
     :param codec: of the frames.
     :param quarantine: given where the exchange itself goes through the channel.
-    :param doubt: see :class:`.ControlByNumber`; ``known``, too.
+    :param invalidate: see :class:`.ControlByNumber`; ``known``, too.
     :ivar channel: everything acyclic goes through it, by the ``transactor``.
     :ivar numbers: where the parameters of the drive stand.
     :ivar control_slot: of the control word in ``cyclic_request``, or None.
@@ -55,7 +55,7 @@ class AcyclicSide:
 
     def __init__(self, session: Session, codec: AcyclicCodec, *,
                  quarantine: float | None = None,
-                 doubt: Callable[[], None] = lambda: None,
+                 invalidate: Callable[[], None] = lambda: None,
                  known: Callable[[float], None] = lambda now: None) -> None:
         drive, options = session.configuration, session.configuration.options
         self.numbers = Numbers(drive)
@@ -88,7 +88,8 @@ class AcyclicSide:
             refresh=options.refresh_interval if polled else 0.0)
         self.control_writer = None if session.control is None or not (word or status) else (
             ControlByNumber(session, session.control, self.channel, self.transactor, self.numbers,
-                            self.output, word=word, status=status, doubt=doubt, known=known))
+                            self.output, word=word, status=status, invalidate=invalidate,
+                            known=known))
         self.parts = () if self.control_writer is None else (self.control_writer,)
         self.stop: SafeStop[Step, Reply] = SafeStop(
             session, self.channel, session.stop_ended, at_end, self._read_status)
@@ -173,7 +174,7 @@ class AcyclicSide:
         # late answers are not believed, and what others ask now may be answered late, too
         asked = {self.numbers.number(each.parameter) for each in told}.union(self._witnesses)
         return longest + answer * (1 + sum(
-            self.channel.doubtful(ParameterRead(each)) for each in asked))
+            self.channel.late_answers(ParameterRead(each)) for each in asked))
 
     def begin_stop(self, now: float, *, setpoints: bool = True, again: bool = False) -> None:
         """
@@ -228,9 +229,9 @@ def confirm(writes: Sequence[tuple[Parameter, ParameterWrite]], timeout: float,
         for each in (*blind, *wrong) if attempt else ():
             if (yield each[1]) is not None:
                 taken.add(each[1])
-        doubtful, failed, silent = wrong, [], False
+        late_answers, failed, silent = wrong, [], False
         wrong = []
-        for parameter, write in doubtful:
+        for parameter, write in late_answers:
             reply = None if silent else (yield ParameterRead(
                 write.number, attempts=1, late_will_do=True, timeout=timeout))
             silent = reply is None
@@ -242,7 +243,7 @@ def confirm(writes: Sequence[tuple[Parameter, ParameterWrite]], timeout: float,
                           sentences.write_read_back(what, reply[0], write.words[0]))
         if not wrong and not blind:
             return failed
-    if not doubtful:    # nothing was read behind the last write
+    if not late_answers:    # nothing was read behind the last write
         silent = True
         numbers = *(write.number for _, write in readable), *witnesses
         # the first one twice: its answer may be late

@@ -61,7 +61,7 @@ POLL_PERIOD = 1.0
 #: longest pause between map rewrites
 REWRITE_PAUSE_MAX = 60.0
 #: so many looks at the maps in a row may go unanswered until that is told
-SILENT_LOOKS = 3
+SILENT_POLLS = 3
 #: s until a position that a setpoint cannot carry is read again
 POSITION_PAUSE = 0.1
 #: all setpoints go by cycles: what the output of acyclic writes knows them as
@@ -79,7 +79,7 @@ class ExtendedSession(Session):
         super().__init__(drive, control, roles=Roles(
             drive, controlled=table is not None, maps=map_cells(options)))
         self._side = AcyclicSide(self, extended.ExtendedAcyclicCodec(station, strict),
-                                 doubt=lambda: self._answers.book.doubt())
+                                 invalidate=lambda: self._answers.book.invalidate())
         self._channel = self._side.channel
         self._verify: bool = options.mapping != 'assume'
         self._codec = CyclicCodec(
@@ -98,12 +98,12 @@ class ExtendedSession(Session):
         self.encode_cycle = self._codec.encode_request
         self._answers: CycleAnswers = CycleAnswers(self, silence='no cyclic response')
         self._exchange = CyclicExchange(self._answers, self, slot=self._side.control_slot)
-        self._answers.heeded = not self._verify      # otherwise the maps tell who has heard it
+        self._answers.confirms = not self._verify      # otherwise the maps tell who has heard it
         self._lifecycle = Lifecycle(self._channel)
-        self.look_after(self._exchange, self._lifecycle, *self._side.parts, channel=self._channel)
+        self.set_parts(self._exchange, self._lifecycle, *self._side.parts, channel=self._channel)
         self._differs = False       # what the last look at the maps found
         self._unread = NOTHING      # nobody knows whether the maps are still right
-        self._told = NOTHING        # which difference
+        self._reported = NOTHING        # which difference
         self._rewritten_at, self._pause = -math.inf, POLL_PERIOD
 
     # -- life cycle -------------------------------------------------------------------------------
@@ -125,11 +125,12 @@ class ExtendedSession(Session):
         by_number = self._side.longest_stop(setpoints=not self._exchange.cycling)
         return by_number + (self._exchange.longest_stop if self._exchange.cycling else 0.0)
 
-    def time_lost(self, now: float) -> None:
+    def handle_stall(self, now: float) -> None:
         # no answer to a stop that just left will come; with assumed maps, its cycles go on
-        if self._verify and self.stage is Stage.RUNNING and self.unshown and not self.owed:
+        if (self._verify and self.stage is Stage.RUNNING and self.unacknowledged
+                and not self.stop_pending):
             self.duty.happened(Happened.SILENT)
-        super().time_lost(now)
+        super().handle_stall(now)
 
     def begin(self, now: float) -> None:
         self._exchange.stop()
@@ -149,36 +150,36 @@ class ExtendedSession(Session):
         """Look at the maps, for ever; cycle while they agree."""
         exchange, self._unread = self._exchange, NOTHING
         agreed = differed = False   # what the look before found
-        silent_looks = 0            # so many in a row went unanswered
+        silent_polls = 0            # so many in a row went unanswered
         while self._verify:
             maps: procedures.Maps | None = yield procedures.read_maps(
                 *self._map_bases, needed=self._wanted[0] if agreed else None)
             now = self._channel.now
-            look_at = now + POLL_PERIOD
+            poll_at = now + POLL_PERIOD
             found = '' if maps is None else '; '.join(differences(
                 maps.request, maps.response,
                 wanted_request=self._wanted[0], wanted_response=self._wanted[1]))
             if maps is not None and found:
                 self._differ(found, maps, now, again=differed)
-                agreed, differed, silent_looks = False, True, 0
-                look_at = yield from self._make_fit(found, look_at)
+                agreed, differed, silent_polls = False, True, 0
+                poll_at = yield from self._make_fit(found, poll_at)
             elif maps is None or maps.response is None:
-                differed, silent_looks = False, silent_looks + 1
+                differed, silent_polls = False, silent_polls + 1
                 if exchange.leaving and not self._differs:
                     return      # who starts over follows the last of the cycles
                 if not exchange.cycling:
                     self._nobody_answers(now)
-                    if silent_looks >= SILENT_LOOKS:    # what they were says nothing any more
-                        self._differs, self._told = False, NOTHING
-                    look_at = now   # paced by the time-out of the read
-                elif silent_looks >= SILENT_LOOKS and not exchange.leaving:
+                    if silent_polls >= SILENT_POLLS:    # what they were says nothing any more
+                        self._differs, self._reported = False, NOTHING
+                    poll_at = now   # paced by the time-out of the read
+                elif silent_polls >= SILENT_POLLS and not exchange.leaving:
                     # there, the cyclic answers tell who is there
-                    self._unread = sentences.maps_unknown(silent_looks)
-                    if silent_looks == SILENT_LOOKS:
+                    self._unread = sentences.maps_unknown(silent_polls)
+                    if silent_polls == SILENT_POLLS:
                         self.report.warn(self._unread)
             else:
-                agreed, differed, silent_looks = True, False, 0
-                self._differs, self._unread, self._told = False, NOTHING, NOTHING
+                agreed, differed, silent_polls = True, False, 0
+                self._differs, self._unread, self._reported = False, NOTHING, NOTHING
                 if now - self._rewritten_at > REWRITE_PAUSE_MAX:
                     self._pause = POLL_PERIOD
                 if exchange.cycling and not exchange.leaving:
@@ -189,13 +190,13 @@ class ExtendedSession(Session):
                         self.duty.happened(Happened.ANSWERED)
                 elif exchange.leaving and self.setpoints.held:
                     pass    # a stop takes its course
-                elif (yield from self._find_axes(look_at)):
+                elif (yield from self._find_axes(poll_at)):
                     self._start_cycling(self._channel.now)
-                elif self._channel.now < look_at:   # it has not answered, and may have
+                elif self._channel.now < poll_at:   # it has not answered, and may have
                     agreed = False                  # restarted meanwhile, with other maps
-                    self._side.again.heard(self._channel.now, answered=True)
+                    self._side.again.sign_of_life(self._channel.now, answered=True)
                     continue
-            yield look_at
+            yield poll_at
         # a drive that was told to run has to be told ``disable``, whatever is known of its axes
         if not self.setpoints.known and (
                 not self.setpoints.ever_known or self.interlock.position_unknown):
@@ -260,13 +261,13 @@ class ExtendedSession(Session):
         if not exchange.leaving:
             exchange.run_out(max(now, exchange.timer.began_at + exchange.timer.stop_spacing))
 
-    def _make_fit(self, found: str, look_at: float) -> Generator[Any, Any, float]:
+    def _make_fit(self, found: str, poll_at: float) -> Generator[Any, Any, float]:
         """Rewrite maps that differ, if that is wanted, or tell; return when to look again."""
         if not self._rewrites:
-            self._tell(sentences.maps_found(found))
-            return look_at
+            self._report_difference(sentences.maps_found(found))
+            return poll_at
         if self._channel.now < self._rewritten_at + self._pause:
-            self._tell(sentences.maps_wait(found, self._pause))
+            self._report_difference(sentences.maps_wait(found, self._pause))
         elif (yield self._rewrite()):
             return self._channel.now
         return self._rewritten_at + self._pause
@@ -281,24 +282,24 @@ class ExtendedSession(Session):
         self._rewritten_at = self._channel.now
         self.remedy = sentences.drive_to_correct if failure and kept else sentences.maps_not_kept
         if failure:
-            self._tell(sentences.maps_not_written(failure))
+            self._report_difference(sentences.maps_not_written(failure))
         else:
             self.report.note(MappingWritten(sentences.maps_written(request, response)))
-            self._told = NOTHING
+            self._reported = NOTHING
         return not failure
 
-    def _tell(self, text: Sentence) -> None:
+    def _report_difference(self, text: Sentence) -> None:
         """Report a difference, once."""
         self.report.advise(sentences.mapping_differs(text), AdviceKind.MAPPING)
-        if text != self._told:
-            self._told = text
+        if text != self._reported:
+            self._reported = text
             self.report.note(MappingDiffered(text))
 
     def _nobody_answers(self, now: float) -> None:
         self.report.guess(sentences.maps_unread())
         if self._side.shows_up:     # and answers a part of what it is asked
             self._side.shows_up = False
-            self._side.again.heard(now, answered=True)
+            self._side.again.sign_of_life(now, answered=True)
 
     # -- cyclic exchange --------------------------------------------------------------------------
 
@@ -317,7 +318,7 @@ class ExtendedSession(Session):
         if self.stage is Stage.STOPPING:
             self._exchange.timer.stop()
             if self._side.control_slot is not None and not self._answers.book.missed_in_row:
-                self._side.stop.look(now)
+                self._side.stop.poll(now)
             self.stop_ended()
         elif self._differs:
             self._exchange.stop()
@@ -325,7 +326,7 @@ class ExtendedSession(Session):
     def stop_ended(self) -> None:
         if (self.stage is Stage.STOPPING and not self._side.stop.running
                 and (self._exchange.cycles_left == 0 or not self._exchange.cycling)):
-            self._exchange.doubt_the_end()
+            self._exchange.mark_silent()
             self.stop_left()
 
     def exchange_missed(self, reason: Sentence, now: float) -> None:
@@ -333,20 +334,20 @@ class ExtendedSession(Session):
             if self._exchange.cycles_left == 0:
                 # if nobody answers any more: next it is told by number
                 self.duty.happened(Happened.SILENT)
-                self.start_over(now)
+                self.restart(now)
             return
         if not reason:
             return
         self._answers.forget()
         if self._verify and not self.online:
-            self.start_over(now)
+            self.restart(now)
             return
         do = self.duty.happened(Happened.LOST if self.online else Happened.UNANSWERED)
         self.lose(reason, now)
         if do is not Do.NOTHING:    # setpoints that heard cycles go neutral with the next
             self._side.begin_stop(now, setpoints=do is Do.STOP_BY_NUMBER)
         if self.interlock.position_unknown:
-            self.start_over(now)
+            self.restart(now)
         elif self._verify:  # it may still be listening, before it is left alone
             self._exchange.run_out(self._exchange.timer.due)
 
@@ -377,7 +378,7 @@ class ExtendedSession(Session):
         if not self.online and self.stage is Stage.RUNNING:
             if self._exchange.leaving:
                 if not self._differs:  # it is back: look at its maps before anything else
-                    self.start_over(now)
+                    self.restart(now)
                 return
             self.be_online()
             # a neutral cycle, right after a look at its maps; what was written it may have missed
@@ -391,7 +392,7 @@ class ExtendedSession(Session):
             self.interlock.status(raws[slot] if slot < len(raws) else None, now)
             self.control_changed(now)
         if self._answers.book.stop_shown and self._side.output.has(_CYCLE):
-            self.see_to_control_word(now)
+            self.update_control_word(now)
         self.interlock.measured(raws)
         self.report.note(ProcessDataReceived(raws, received_at))
         self._channel.release(now)
@@ -406,7 +407,7 @@ class ExtendedSession(Session):
     def hand_out_neutral(self, now: float) -> None:
         self._exchange.hand_out_neutral(now)
 
-    def see_to_control_word(self, now: float) -> None:
+    def update_control_word(self, now: float) -> None:
         if self.stage is Stage.STOPPING:
             return
         writer = self._side.control_writer
@@ -421,7 +422,7 @@ class ExtendedSession(Session):
         """Return whether a word that starts the drive waits for the answer to a neutral cycle."""
         output = self._side.output
         lacks = output.holds_word(again=output.word_due(now))
-        if lacks and output.told(_CYCLE) is None:
+        if lacks and output.last_written(_CYCLE) is None:
             output.written(_CYCLE, 0, now)
             self._exchange.hand_out_neutral(now)
         return lacks
@@ -432,8 +433,8 @@ class ExtendedSession(Session):
         return {'short_frames': str(self.statistics.short)}
 
     @property
-    def unshown(self) -> bool:
-        return super().unshown and not self._answers.book.stop_shown
+    def unacknowledged(self) -> bool:
+        return super().unacknowledged and not self._answers.book.stop_shown
 
     @property
     def warning(self) -> Sentence:

@@ -115,7 +115,7 @@ class ExtendedObserver(DriveObserver):
         self._cycle.ask(now)
         raws, wrong = self._codec.decode_request(data)
         if wrong:
-            self.tell(now, _REQUEST, _CYCLIC, 'cyclic request', verdict=Verdict.MALFORMED,
+            self.report(now, _REQUEST, _CYCLIC, 'cyclic request', verdict=Verdict.MALFORMED,
                       remark=wrong)
             return
         self.emit(Telegram(now, self.name, _REQUEST, _CYCLIC, 'cyclic request', self._request,
@@ -124,21 +124,21 @@ class ExtendedObserver(DriveObserver):
     def _take_response(self, data: bytes, now: float) -> None:
         raws, wrong = self._codec.decode_response(data)
         if wrong and self._cycle.asked:
-            self.tell(now, _RESPONSE, _CYCLIC, 'cyclic response', self._response, raws,
+            self.report(now, _RESPONSE, _CYCLIC, 'cyclic response', self._response, raws,
                       verdict=Verdict.MALFORMED, remark=wrong)
             if raws:
                 self._cycle.answer(now)
             return
         verdict, latency = self._cycle.answer(now)
         if wrong:   # nobody was heard to ask for it
-            self.tell(now, _RESPONSE, _CYCLIC, 'cyclic response', self._response, raws,
+            self.report(now, _RESPONSE, _CYCLIC, 'cyclic response', self._response, raws,
                       verdict=Verdict.MALFORMED if verdict is _NORMAL else verdict,
                       remark=wrong, latency=latency)
         elif verdict is _NORMAL:
             self.emit(Telegram(now, self.name, _RESPONSE, _CYCLIC, 'cyclic response',
                                self._response, raws, verdict, '', latency))
         else:
-            self.tell(now, _RESPONSE, _CYCLIC, 'cyclic response', self._response, raws,
+            self.report(now, _RESPONSE, _CYCLIC, 'cyclic response', self._response, raws,
                       verdict=verdict, latency=latency)
 
     def _take_acyclic(self, identifier: int, data: bytes, now: float) -> None:
@@ -162,7 +162,7 @@ class StandardObserver(DriveObserver):
         request, self._response = (
             standard.identifier(base, drive.station)
             for base in (options.request_id_base, options.response_id_base))
-        self.hear(request, _REQUEST, _PARAMETER, 'frame', lambda data: standard.decode_request(
+        self.listen(request, _REQUEST, _PARAMETER, 'frame', lambda data: standard.decode_request(
             Frame(request, data, False)), self._take_request)
         self.handlers[self._response] = self._take_response
         self._traffic = _Traffic(self, drive, plan=reads(drive), setpoints=drive.cyclic_request)
@@ -176,7 +176,7 @@ class StandardObserver(DriveObserver):
     def _take_response(self, data: bytes, now: float) -> None:
         chunk = self._last
         if chunk is None:       # asked before the trace began
-            self.tell(now, _RESPONSE, _PARAMETER, 'read', remark=f'data {data.hex(" ").upper()}')
+            self.report(now, _RESPONSE, _PARAMETER, 'read', remark=f'data {data.hex(" ").upper()}')
             return
         words = self.decoded(
             lambda data: standard.decode_read_response(

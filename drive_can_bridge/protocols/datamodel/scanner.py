@@ -38,12 +38,12 @@ class ExtendedScanner(Scanner):
             extended.encode_read_request(station, REQUEST_MAP_BASE, extended.SLOTS)
             for station in range(1, extended.STATION_MAX + 1)]
 
-    def hear_request(self, frame: Frame, now: float) -> None:
+    def receive_request(self, frame: Frame, now: float) -> None:
         # its answer repeats the identifier, but for the direction
         self._request(extended.station_of(frame.identifier), frame.data, now,
                       service=frame.identifier)
 
-    def hear(self, frame: Frame, now: float) -> None:
+    def receive(self, frame: Frame, now: float) -> None:
         try:
             telegram = extended.decode(frame)
         except RemoteProtocolError:
@@ -60,7 +60,7 @@ class ExtendedScanner(Scanner):
                 self._take_map(station, telegram.number, telegram.words)
         else:
             if not isinstance(telegram, extended.WriteTelegram):    # which nobody answers
-                self.hear_request(frame, now)
+                self.receive_request(frame, now)
             self.master = frame_sentences.requests_to_station(station, self.protocol)
 
     def _take_map(self, station: int, base: int, words: tuple[int, ...]) -> None:
@@ -109,7 +109,7 @@ class StandardScanner(Scanner):
             standard.encode_read_request(standard.REQUEST_ID_BASE + station, HARMLESS_NUMBER, 1)
             for station in range(1, STANDARD_STATION_MAX + 1)]
 
-    def hear_request(self, frame: Frame, now: float) -> None:
+    def receive_request(self, frame: Frame, now: float) -> None:
         station = frame.identifier - standard.REQUEST_ID_BASE
         if frame.extended or not 1 <= station <= STANDARD_STATION_MAX:
             return
@@ -120,8 +120,8 @@ class StandardScanner(Scanner):
         if isinstance(request, extended.ReadTelegram):
             self._request(station, frame.data, now)
 
-    def hear(self, frame: Frame, now: float) -> None:
-        self.hear_request(frame, now)
+    def receive(self, frame: Frame, now: float) -> None:
+        self.receive_request(frame, now)
         station = frame.identifier - standard.RESPONSE_ID_BASE
         if frame.extended or not 1 <= station <= STANDARD_STATION_MAX:
             return

@@ -42,16 +42,17 @@ class ControlByNumber:
 
     :param word: parameter of the control word; None: it has one.
     :param status: parameter of the status word; None: it has one, or there is none.
-    :param doubt: records that answers to what was asked before show nothing of a word that left.
+    :param invalidate: records that answers to what was asked before show nothing of a word that
+        left.
     :param known: records that the status was read just now.
     """
 
     def __init__(self, session: Session, control: ControlMachine, channel: Channel[Step, Reply],
                  transactor: ParameterTransactor, numbers: Numbers, output: AcyclicOutput, *,
                  word: Parameter | None, status: Parameter | None,
-                 doubt: Callable[[], None], known: Callable[[float], None]) -> None:
+                 invalidate: Callable[[], None], known: Callable[[float], None]) -> None:
         self._session = session
-        self._doubt, self._known = doubt, known
+        self._invalidate, self._known = invalidate, known
         self._control = control
         self._channel = channel
         self._transactor = transactor
@@ -64,8 +65,8 @@ class ControlByNumber:
     def begin(self, now: float) -> None:
         """Handle a drive that was found: it gets its word, and its status is looked at."""
         self._output.forget_word()
-        self._output.start_over()
-        self._look(now)
+        self._output.restart()
+        self._poll(now)
 
     def end(self) -> None:
         """Leave the status of a lost drive alone."""
@@ -89,22 +90,22 @@ class ControlByNumber:
         write(self._numbers.write(self._word, word),
               lambda sent, then: self._left(word, sent, then, runs=runs), now)
 
-    def look_soon(self, now: float) -> None:
+    def poll_soon(self, now: float) -> None:
         """Read the status now, unless that is under way: a word waits for it."""
         if now < self._watch.due < math.inf:
-            self._look(now)
+            self._poll(now)
 
     @property
     def due(self) -> float:
         """When the status is to be looked at, or a word to be written again."""
-        look_at = self._watch.due
-        return look_at if self._word is None else min(look_at, self._output.again_at)
+        poll_at = self._watch.due
+        return poll_at if self._word is None else min(poll_at, self._output.again_at)
 
     def handle_timer(self, now: float) -> None:
         """Do what is due."""
         self._watch.handle_timer(now)
         if self._word is not None and self._output.handle_timer(now):
-            self._session.see_to_control_word(now)
+            self._session.update_control_word(now)
 
     def _left(self, word: int, sent: bool, now: float, *, runs: bool) -> None:
         session, online = self._session, self._session.online
@@ -112,19 +113,19 @@ class ControlByNumber:
             self._output.word_refused(word, now + REFUSED_PAUSE)
             return
         session.duty.channel(CONTROL_WORD, Happened.RUN_LEFT if runs else Happened.STOP_LEFT)
-        self._doubt()
+        self._invalidate()
         # of a drive that is lost, others see to the stop
         self._output.word_left(now, word, again=online)
         if online and session.stage is Stage.RUNNING:
-            self._look(now)
+            self._poll(now)
         session.control_changed(now)
 
-    def _look(self, now: float) -> None:
+    def _poll(self, now: float) -> None:
         """Read the status from now on; what was asked before does not count."""
         if self._status is not None:
-            self._watch.start(self._look_at(self._status, now), now)
+            self._watch.start(self._poll_status(self._status, now), now)
 
-    def _look_at(self, status: Parameter, now: float) -> Script:
+    def _poll_status(self, status: Parameter, now: float) -> Script:
         while True:
             yield now
             raw = yield self._read(status)
@@ -164,7 +165,7 @@ class SetpointWriter:
         """Plan nothing any more: nothing is known of the drive."""
         self._output.forget()
 
-    def look(self, now: float, *, unanswered: bool = False, known: bool = False) -> None:
+    def collect_due(self, now: float, *, unanswered: bool = False, known: bool = False) -> None:
         """
         Find out what is to be written.
 
@@ -179,13 +180,13 @@ class SetpointWriter:
         if slot is not None and output.word_due(now) and (
                 stopping or not self._exchange.reading):
             output.failed(slot)
-        doubt = starts and (self._exchange.silent or unanswered)
+        uncertain = starts and (self._exchange.silent or unanswered)
         if starts and self._exchange.silent:
-            output.start_over()
+            output.restart()
         repeated = starts and control is not None and not (control.word_due or control.pulsing)
-        hold = [slot] if doubt or repeated and not known or self.holds_word(now) else []
+        hold = [slot] if uncertain or repeated and not known or self.holds_word(now) else []
         unknown = self._session.setpoints.unknown
-        output.look(self._raws(), now, hold=hold, unknown=[
+        output.collect_due(self._raws(), now, hold=hold, unknown=[
             index for index, parameter in enumerate(self._parameters)
             if parameter.name in unknown] if unknown else ())
         if control is not None:
@@ -222,9 +223,9 @@ class SetpointWriter:
         """
         Write a control word that is due, or what it waits for, without waiting for a period.
 
-        :param known: see :meth:`look`.
+        :param known: see :meth:`collect_due`.
         """
-        self.look(now, known=known)
+        self.collect_due(now, known=known)
         self.write(now)
 
     def write_again(self, since: float, now: float) -> bool:
@@ -235,7 +236,7 @@ class SetpointWriter:
         """
         control, slot = self._session.control, self._slot
         starts = control is not None and control.starts
-        doubtful = self._output.doubt(since, but=[slot] if starts else ())
+        doubtful = self._output.invalidate(since, but=[slot] if starts else ())
         if doubtful:
             self.write_word(now)
         return doubtful
@@ -249,7 +250,7 @@ class SetpointWriter:
     def handle_timer(self, now: float) -> None:
         """Write what is due."""
         if self._slot is not None and self._output.handle_timer(now):
-            self._session.see_to_control_word(now)
+            self._session.update_control_word(now)
         self.write(now)
 
     @property
@@ -276,7 +277,7 @@ class SetpointWriter:
         control = self._session.control
         if index != self._slot or control is None:
             if self._output.has(index):
-                self._session.see_to_control_word(now)
+                self._session.update_control_word(now)
             return
         if self._output.word_left(now, raw):
             self._session.control_changed(now)

@@ -53,7 +53,7 @@ class StandardSession(Session):
         self._writer = SetpointWriter(
             self, self._exchange, self._side.transactor, self._side.numbers, self._side.output,
             slot=self._side.control_slot)
-        self.look_after(self._writer, *self._side.parts, channel=self._channel)
+        self.set_parts(self._writer, *self._side.parts, channel=self._channel)
         self._expected = False  # the answer of a read that nobody wants any more may come
         self._missed = False            # a round, since the last one that was answered
         self._heard_at = -math.inf      # when that was asked for
@@ -75,26 +75,26 @@ class StandardSession(Session):
     def longest_stop(self) -> float:
         return self._side.longest_stop()
 
-    def time_lost(self, now: float) -> None:
+    def handle_stall(self, now: float) -> None:
         self._expected = self._expected or self._side.transactor.outstanding is not None
         self._exchange.disregard()
-        self._channel.time_lost(now)
+        self._channel.handle_stall(now)
         if self.stage is Stage.RUNNING:
-            self.stood_still(now)
+            self.lose_after_stall(now)
             self._timer.start(now)
 
     def begin(self, now: float) -> None:
         self.report.guess(sentences.reads_unanswered())
         self._round.gap = NOTHING
-        self._tell_to_stop(now, self.duty.happened(Happened.STARTED))
+        self._command_stop(now, self.duty.happened(Happened.STARTED))
         self._timer.start(now)
 
     def lost(self, now: float, *, was_online: bool) -> None:
         self.duty.happened(Happened.SILENT)     # it may only have lost its voice
         do = self.duty.happened(Happened.LOST)
-        self._tell_to_stop(now, Do.STOP if was_online else do)
+        self._command_stop(now, Do.STOP if was_online else do)
 
-    def _tell_to_stop(self, now: float, do: Do) -> None:
+    def _command_stop(self, now: float, do: Do) -> None:
         self._writer.stop()
         if self.bus_available and do is Do.STOP:
             self._side.begin_stop(now)
@@ -112,7 +112,7 @@ class StandardSession(Session):
 
     def handle_timer(self, now: float) -> None:
         if self.interlock.expire(now):
-            self._writer.look(now, unanswered=self._exchange.reading)
+            self._writer.collect_due(now, unanswered=self._exchange.reading)
         if now >= self._timer.due:
             self._tick(now)
         super().handle_timer(now)
@@ -123,10 +123,10 @@ class StandardSession(Session):
     def _tick(self, now: float) -> None:
         """Begin a period: look what is to be written, then read."""
         if self.online:
-            self._writer.look(now, unanswered=self._exchange.reading)
+            self._writer.collect_due(now, unanswered=self._exchange.reading)
             by_number = self._side.control_writer
             if by_number is not None and self._writer.wants_status(now):
-                by_number.look_soon(now)
+                by_number.poll_soon(now)
         if self._exchange.reading:
             self._exchange.wait(now, self._patience)    # somebody may keep disturbing
             return
@@ -147,7 +147,7 @@ class StandardSession(Session):
     def hand_out_neutral(self, now: float) -> None:
         self._writer.write_all(now)
 
-    def see_to_control_word(self, now: float) -> None:
+    def update_control_word(self, now: float) -> None:
         control, by_number = self.control, self._side.control_writer
         if control is None or not self.online or self.stage is not Stage.RUNNING:
             return
@@ -165,7 +165,7 @@ class StandardSession(Session):
     def round_found(self, now: float) -> None:
         self.be_online()
         self._writer.stop()
-        self._writer.look(now)
+        self._writer.collect_due(now)
         self._side.found(now)
 
     def round_answered(self, raws: Raws, now: float, *, found: bool) -> None:
@@ -220,7 +220,7 @@ class StandardSession(Session):
         if frame.identifier == self._request_identifier:
             self._side.foreign_master(frame)
             return
-        self._side.again.heard(now)
+        self._side.again.sign_of_life(now)
         transactor = self._side.transactor
         # it may have come before the question
         if transactor.outstanding is None or now - age < transactor.asked_at:

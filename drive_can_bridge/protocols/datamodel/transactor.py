@@ -189,7 +189,7 @@ class ParameterTransactor(Transactor[Step, Reply]):
         """Return whether an answer taken now has not waited for a process that stood still."""
         return now - asked_at <= self.retry.timeout + TOLERANCE
 
-    def time_lost(self, now: float) -> Reply | bool:
+    def handle_stall(self, now: float) -> Reply | bool:
         if self.outstanding is None or not self.anonymous:
             return False    # its answer will say what it answers
         self.finish()
@@ -214,7 +214,7 @@ class ParameterTransactor(Transactor[Step, Reply]):
             return ANYTHING
         return None if step.late_will_do else step.key
 
-    def doubted(self, step: Step) -> Hashable | None:
+    def late_key(self, step: Step) -> Hashable | None:
         # one that was asked before the stop was written proves nothing
         if self.anonymous or not isinstance(step, ParameterRead):
             return self.key(step)

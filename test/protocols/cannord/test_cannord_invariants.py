@@ -60,7 +60,7 @@ class CannordObserver(Observer):
         self.doubt()
         self.online = online
         self.last_cycles = 0 if session.stopped else (
-            STOP_CYCLES + MORE_CYCLES * session.duty.unshown)
+            STOP_CYCLES + MORE_CYCLES * session.duty.unacknowledged)
         self.asked = None
 
     def sees(self, sent: Frame, now: float) -> None:

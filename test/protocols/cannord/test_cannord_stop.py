@@ -53,7 +53,7 @@ def test_what_is_under_way_during_a_stall_is_not_missed() -> None:
     talk = running()
     talk.at(10.06)
     missed = talk.session.statistics.missed
-    talk.time_lost(15.0)
+    talk.handle_stall(15.0)
     assert exchange(talk, 15.0) == READY_FRAME
     assert talk.session.statistics.missed == missed
 
@@ -65,7 +65,7 @@ def test_after_a_stall_nobody_waits_for_the_beat() -> None:
     talk.commands(0, 0.0, 13.8)
     talk.commands(0, 25.0, 13.8)
     assert exchange(talk, 14.0, RUNNING) == HALF_FRAME
-    assert talk.time_lost(15.2) == []
+    assert talk.handle_stall(15.2) == []
     assert talk.until(17.1) == [(15.2, READY_FRAME)]
 
 

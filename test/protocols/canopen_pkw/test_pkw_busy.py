@@ -209,10 +209,10 @@ def test_the_answer_to_a_command_proves_no_stop(late: float) -> None:
     talk = hurried()
     assert talk.hears(echo(SPEED_1), 10.2) == [STILL_0]
     assert talk.control_outcomes() == []
-    assert talk.session.owed
+    assert talk.session.stop_pending
     talk.hears(echo(STILL_0), 10.21 + late)
     assert talk.control_outcomes() == [('quick_stop', True, says('neutral_without_control'))]
-    assert not talk.session.owed
+    assert not talk.session.stop_pending
 
 
 def test_a_stop_whose_commands_answer_was_lost_is_written_once_more() -> None:

@@ -47,7 +47,7 @@ def test_the_end_of_a_drive_that_never_ran_and_does_not_answer_is_told() -> None
 
 def test_stall() -> None:
     talk = running()
-    assert talk.time_lost(15.0) == [START, DISABLE_0]
+    assert talk.handle_stall(15.0) == [START, DISABLE_0]
     assert talk.hears(DISABLED_0, 15.003) == []
     assert talk.until(15.0501) == [(15.05, READ_1)], 'the answer has synchronised the mailbox'
     assert worries(talk) == []
@@ -66,7 +66,7 @@ def test_a_command_that_is_too_old_by_then_changes_no_stop(
         elif way == 'a defect':
             session.fail(says('internal_error_in_callback', kind='', text=''), 10.115)
         elif way == 'a stall':
-            found += [(10.115, text) for text in talk.time_lost(10.115)]
+            found += [(10.115, text) for text in talk.handle_stall(10.115)]
         elif way == 'the bus':
             talk.bus_down(10.115)
             talk.bus_up(10.12)
@@ -174,7 +174,7 @@ def test_disable_that_the_bus_takes_at_last_has_time_for_its_answer() -> None:
     talk.hears(DISABLED_0, 10.834)
     assert talk.control_outcomes() == []        # the status is still to be read
     assert talk.session.statistics.rejected == 0
-    assert not talk.session.duty.owed
+    assert not talk.session.duty.stop_pending
 
 
 def test_enable_that_is_due_again_goes_behind_setpoints() -> None:
@@ -263,7 +263,7 @@ def test_stop_word_whose_frame_got_lost_is_repeated_before_anything_else(
     assert talk.until(10.166) == [(10.165, f'505#C00200AA{word}000000')], 'no function 00h'
     assert talk.hears('485#C00200AA00000000', 10.167) == [STILL_0], 'and no read-back'
     assert talk.hears('485#C602002A00000000', 10.168) == [READ_CLASS_1]
-    assert talk.session.duty.owed is (word != '00')
+    assert talk.session.duty.stop_pending is (word != '00')
     assert worries(talk) == []
 
 

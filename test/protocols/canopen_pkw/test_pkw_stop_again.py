@@ -54,7 +54,7 @@ def silent(talk: Conversation, end: float) -> Conversation:
     talk.until(end)
     assert not talk.session.online
     assert [note.text for note in talk.events(Noted) if note.danger] == [FAILED]
-    assert talk.session.duty.owed
+    assert talk.session.duty.stop_pending
     return talk
 
 
@@ -65,7 +65,7 @@ def test_one_register_unanswered_when_it_is_back() -> None:
     place, = (place for place, (_, text) in enumerate(sent) if text in STOPS)
     assert sent[place - 1][1][4:8] == 'C701', 'right behind the first answer'
     assert sent[place][0] == pytest.approx(sent[place - 1][0] + 0.002)
-    assert not talk.session.duty.owed
+    assert not talk.session.duty.stop_pending
     assert [note.text for note in talk.events(Noted)] == [CONFIRMED]
     assert [text[4:8] for _, text in sent].count('C701') > 2, 'rounds go on'
     assert 'average_current' in talk.session.offline_advice
@@ -80,7 +80,7 @@ def test_one_that_is_back_right_after_the_stop_it_has_not_heard_is_told_at_once(
     sent = talk.served(talk.now + 0.9, half)
     assert not talk.session.online
     assert len(stops(sent)) == 1
-    assert not talk.session.duty.owed
+    assert not talk.session.duty.stop_pending
 
 
 def test_drive_that_is_deaf_first_and_answers_later() -> None:
@@ -126,7 +126,7 @@ def test_heartbeat() -> None:
     assert talk.until(14.9) == []
     assert talk.until(15.07) == [(15.06, DISABLE_0)], 'no room is made any more'
     assert talk.hears(DISABLED_0, 15.07) == [READ_1], 'which has synchronised the mailbox'
-    assert not talk.session.duty.owed
+    assert not talk.session.duty.stop_pending
     assert [note.text for note in talk.events(Noted)] == [CONFIRMED]
     assert talk.hears(OPERATIONAL, 17.0) == []
     assert not stops(talk.until(20.0))
@@ -149,7 +149,7 @@ def test_complete_rounds_of_a_node_whose_heartbeats_have_ceased() -> None:
     sent = talk.served(14.6, well)
     assert not talk.session.online
     assert len(stops(sent)) == 1
-    assert not talk.session.duty.owed
+    assert not talk.session.duty.stop_pending
 
 
 def test_node_that_is_held_back_and_says_so() -> None:

@@ -125,15 +125,15 @@ def test_bit_8_does_not_fall_without_bit_4_when_an_arming_is_taken_back() -> Non
     handshake = SetpointHandshake(
         SimpleNamespace(items=[target]), rules, 2.0,  # type: ignore[arg-type]
         Reporter(DriveStatistics(), NOTHING))
-    handshake.look(0x0027, 0.0)
+    handshake.update(0x0027, 0.0)
     handshake.carried(0x003F, [5000])
     target.armed = False
-    handshake.look(0x1027, 0.0)
+    handshake.update(0x1027, 0.0)
     assert (rules.mode_bits, rules.halted) == (0x100, True)
-    handshake.look(0x0027, 0.0)
+    handshake.update(0x0027, 0.0)
     target.armed, target.raw = True, 6000
-    handshake.look(0x0027, 0.0)
+    handshake.update(0x0027, 0.0)
     assert rules.mode_bits == 0x30
     target.armed = False
-    handshake.look(0x0027, 0.0)
+    handshake.update(0x0027, 0.0)
     assert (rules.mode_bits, rules.halted) == (0x100, True)

@@ -68,7 +68,7 @@ class TestStoppedInMotion:
         axis = running()
         axis.deaf = True
         axis.session._channel.run(      # type: ignore[attr-defined]
-            axis.session._polls._look_at_error(), lambda _: None, axis.now)    # type: ignore[attr-defined]
+            axis.session._polls._poll_error(), lambda _: None, axis.now)    # type: ignore[attr-defined]
         axis.deliver(axis.talk.sent())
         axis.deaf = False
         at = stopped(axis, tells=True)

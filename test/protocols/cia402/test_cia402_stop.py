@@ -118,7 +118,7 @@ class TestTheEnd:
         axis.mute = True
         axis.live(0.5)
         axis.mute = False
-        assert axis.session.owed
+        assert axis.session.stop_pending
         assert axis.drive.state == axis.drive.ENABLED
         doubts(axis)
         return axis
@@ -507,7 +507,7 @@ class TestSegments:
 
     def test_a_stop_waits_for_the_segment_under_way_and_breaks_off(self) -> None:
         axis = self.amidst()
-        axis.deliver(axis.talk.time_lost(axis.now))
+        axis.deliver(axis.talk.handle_stall(axis.now))
         axis.live(0.02)
         assert not any(text.startswith('605#') for text in axis.take())
         axis.says(self.SEGMENT)
@@ -516,7 +516,7 @@ class TestSegments:
 
     def test_but_for_a_moment_only(self) -> None:
         axis = self.amidst()
-        axis.deliver(axis.talk.time_lost(axis.now))
+        axis.deliver(axis.talk.handle_stall(axis.now))
         axis.live(0.051)
         assert by_sdo(axis) == [
             '605#8008100000000405', DISABLE_BY_SDO]
@@ -527,7 +527,7 @@ class TestSegments:
         axis = running(table=(*TABLE, NAME))
         axis.drive.takes = drive_without(axis, 0x605)  # type: ignore[method-assign]
         axis.deliver(axis.talk.submits(read(NAME), axis.now))
-        axis.deliver(axis.talk.time_lost(axis.now))
+        axis.deliver(axis.talk.handle_stall(axis.now))
         axis.live(0.051)
         assert by_sdo(axis) == ['605#4008100000000000', DISABLE_BY_SDO]
         return axis
@@ -549,7 +549,7 @@ class TestSegments:
 
     def test_at_the_end_it_does_not_wait_at_all(self) -> None:
         axis = self.amidst()
-        axis.deliver(axis.talk.time_lost(axis.now))
+        axis.deliver(axis.talk.handle_stall(axis.now))
         axis.deliver(axis.talk.deactivate(axis.now))
         assert by_sdo(axis) == [
             self.BROKEN_OFF, DISABLE_BY_SDO]

@@ -64,7 +64,7 @@ class TestWatched:
     def test_a_stall_does_not_either(self) -> None:
         axis = Axis(make=WatchesSync).enabled()
         axis.now += 1.5
-        axis.deliver(axis.talk.time_lost(axis.now))
+        axis.deliver(axis.talk.handle_stall(axis.now))
         axis.live(2.0)
         assert axis.session.online
 

@@ -69,7 +69,7 @@ def test_one_that_falls_silent_is_told_again_and_named() -> None:
     talk = running()
     talk.until(11.5)
     assert not talk.session.online
-    assert talk.session.duty.owed
+    assert talk.session.duty.stop_pending
     assert warnings(talk) == [may_run('stop_failed', what=[UNHEARD])]
     sent = [text for _, text in talk.served(14.0, {ASK_CURRENT: ZERO, ASK: ANSWER}.get)]
     assert SPEED_ZERO in sent

@@ -210,11 +210,11 @@ def test_a_stall_ends_a_read_whose_answer_would_not_say_what_it_answers() -> Non
     """However short the silence after it."""
     line = Line(quarantine=0.0, attempts=1)
     line.reads(7)
-    line.channel.time_lost(1.01)
+    line.channel.handle_stall(1.01)
     assert line.results == [[None]]
     line = Line(attempts=1)
     line.reads(7)
-    line.channel.time_lost(1.01)
+    line.channel.handle_stall(1.01)
     assert line.results == []
 
 

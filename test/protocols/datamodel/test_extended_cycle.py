@@ -247,7 +247,7 @@ def test_bus_that_comes_up_twice_makes_the_drive_offline_once() -> None:
 def test_lost_time_with_an_answer_in_the_queue() -> None:
     talk = online()
     talk.at(10.02)
-    talk.time_lost(15.0)
+    talk.handle_stall(15.0)
     talk.hears(ANSWER, 15.0)
     assert talk.events(FrameRejected, ProcessDataReceived, StationFound) == []
     talk.hears(ANSWER, 15.001)

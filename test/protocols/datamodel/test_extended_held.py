@@ -273,8 +273,8 @@ def test_without_control_a_lost_drive_is_sent_nothing(mapping: str) -> None:
 
 def test_stall_reads_it_anew_and_believes_no_older_answer() -> None:
     talk = bare(mapping='assume')
-    assert talk.time_lost(12.0) == [ASK_POSITION]
-    assert talk.time_lost(12.05) == []      # waits behind the first one, whose answer is old
+    assert talk.handle_stall(12.0) == [ASK_POSITION]
+    assert talk.handle_stall(12.05) == []      # waits behind the first one, whose answer is old
     assert talk.hears('10200D41#0050000000000000', 12.06) == [ASK_POSITION]
     assert talk.until(12.07) == []
     talk.hears('10200D41#0021000000000000', 12.08)

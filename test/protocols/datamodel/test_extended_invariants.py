@@ -60,7 +60,7 @@ class ExtendedObserver(Observer):
     def deactivated(self, session: Any) -> None:
         self.disarm()
         self.last_cycles = 0 if session.stopped else (
-            STOP_CYCLES + MORE_CYCLES * session.duty.unshown)
+            STOP_CYCLES + MORE_CYCLES * session.duty.unacknowledged)
         self.asked = None
 
     def activated(self) -> None:

@@ -382,7 +382,7 @@ def test_drive_that_falls_silent_in_a_rewrite(answers: int, slot: int) -> None:
 def test_look_that_began_before_time_was_lost_does_not_count() -> None:
     talk = asked()
     talk.hears(REQUEST_MAP, 10.001)
-    assert talk.time_lost(15.0) == []
+    assert talk.handle_stall(15.0) == []
     # the answer lay in a queue for five seconds; the drive may have been replaced meanwhile
     assert talk.hears(RESPONSE_MAP, 15.0) == [ASK_REQUEST_MAP]
     checked(talk, 15.0)

@@ -63,10 +63,10 @@ def stopped_by_number(talk: Conversation, begun: list[str]) -> list[str]:
 
 def test_stop_under_way_is_not_begun_anew() -> None:
     talk = running()
-    assert talk.time_lost(12.0) == [SPEED_ZERO]
+    assert talk.handle_stall(12.0) == [SPEED_ZERO]
     assert talk.events() == [StationLost(says('bridge_stood_still'))]
     assert talk.until(12.004) == [(12.001, LIMIT_ZERO), (12.002, ASK_SPEED)]
-    assert talk.time_lost(12.05) == []
+    assert talk.handle_stall(12.05) == []
     assert talk.until(12.06) == []
     assert talk.hears(SPEED_IS_ZERO, 12.061) == [ASK_LIMIT]
     assert talk.hears(LIMIT_IS_ZERO, 12.062) == [ASK_REQUEST_MAP]
@@ -74,9 +74,9 @@ def test_stop_under_way_is_not_begun_anew() -> None:
 
 def test_stall_with_assumed_maps_needs_no_writes() -> None:
     talk = running(mapping='assume')
-    assert talk.time_lost(12.0) == []
+    assert talk.handle_stall(12.0) == []
     assert talk.at(12.0) == [NEUTRAL]
-    assert not talk.session.duty.owed
+    assert not talk.session.duty.stop_pending
 
 
 def test_stop_that_nobody_had_answered_before_a_stall_is_told_again() -> None:
@@ -84,7 +84,7 @@ def test_stop_that_nobody_had_answered_before_a_stall_is_told_again() -> None:
     talk = running()
     talk.commands(0, 0.0, 10.03)
     assert talk.until(10.04 + TICK) == [(10.04, NEUTRAL)]
-    assert talk.time_lost(11.5) == [SPEED_ZERO]
+    assert talk.handle_stall(11.5) == [SPEED_ZERO]
     talk.until(13.0)
     assert warnings(talk) == [UNHEARD]
 
@@ -104,7 +104,7 @@ def test_bus_that_comes_back_stops_the_drive_before_its_maps_are_read() -> None:
 
 def test_stop_that_a_lost_bus_cut_short_is_begun_anew() -> None:
     talk = running()
-    assert talk.time_lost(12.0) == [SPEED_ZERO]
+    assert talk.handle_stall(12.0) == [SPEED_ZERO]
     assert talk.until(12.004) == [(12.001, LIMIT_ZERO), (12.002, ASK_SPEED)]
     assert talk.bus_down(12.05) == []
     assert talk.bus_up(13.0) == [SPEED_ZERO]
@@ -114,7 +114,7 @@ def test_stop_that_a_lost_bus_cut_short_is_begun_anew() -> None:
 def test_stop_under_way_is_begun_anew_by_the_end() -> None:
     """Whoever hears it only then gets all attempts, and not what is left of them."""
     talk = running()
-    talk.time_lost(12.0)
+    talk.handle_stall(12.0)
     assert [text for _, text in talk.until(12.25)].count(SPEED_ZERO) == 2
     assert talk.deactivate(12.25) == [SPEED_ZERO]
     assert [text for _, text in talk.until(13.0)].count(SPEED_ZERO) == 2
@@ -152,7 +152,7 @@ def test_response_map_that_differs_ends_with_neutral_cycles() -> None:
     talk = response_map_differs()
     assert talk.session.state is DriveState.MAPPING_DIFFERS
     assert talk.until(11.9) == last_cycles(NEUTRAL, 11.02)
-    assert not talk.session.duty.owed
+    assert not talk.session.duty.stop_pending
     # what is answered by another map is not understood
     talk.events()
     assert talk.hears(ANSWER, 11.902) == []
@@ -221,7 +221,7 @@ def enabled_at_a_look(talk: Conversation) -> Conversation:
     talk.until(11.0 + TICK)
     assert talk.hears(ENABLED, 11.002) == [ASK_REQUEST_MAP]
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
-    assert talk.session.duty.owed
+    assert talk.session.duty.stop_pending
     talk.events()
     return talk
 
@@ -272,7 +272,7 @@ def test_map_that_differs_under_a_drive_at_rest_needs_no_stop(maps: tuple[str, .
 def test_neutral_cycles_that_another_map_has_taken_were_no_stop() -> None:
     talk = running()
     look(talk, 0.0, NEUTRAL)     # with the map of somebody else, for who knows how long
-    assert not talk.session.duty.owed
+    assert not talk.session.duty.stop_pending
     assert stopped_by_number(talk, talk.hears(OTHER_REQUEST, 11.003)) == []
 
 
@@ -311,7 +311,7 @@ def test_drive_that_was_deaf_comes_back_with_another_map() -> None:
     last = [text for _, text in talk.until(12.0)]
     assert last.count(NEUTRAL) == STOP_CYCLES
     assert last[-1] == ASK_REQUEST_MAP
-    assert talk.session.duty.owed
+    assert talk.session.duty.stop_pending
     assert talk.hears(OTHER_REQUEST, 12.001) == [ASK_RESPONSE_MAP]
     assert stopped_by_number(talk, talk.hears(RESPONSE_MAP, 12.002)) == []
     assert talk.session.state is DriveState.MAPPING_DIFFERS
@@ -352,7 +352,7 @@ def test_word_that_was_refused_confirms_nothing() -> None:
     assert talk.until(10.02 + TICK) == []
     talk.hears(ENABLED, 10.022)     # an answer to nothing that we know of
     assert talk.control_outcomes() == []
-    assert not talk.session.duty.owed
+    assert not talk.session.duty.stop_pending
 
 
 @pytest.mark.parametrize('refuses', [
@@ -376,7 +376,7 @@ def test_look_at_the_maps_that_the_stop_has_overtaken_shows_nothing_of_it() -> N
     assert talk.hears(REQUEST_MAP, 11.004) == [ASK_RESPONSE_MAP]
     assert talk.until(11.02 + TICK) == [(11.02, NEUTRAL)]
     assert talk.hears(RESPONSE_MAP, 11.021) == []
-    assert talk.session.duty.unshown
+    assert talk.session.duty.unacknowledged
     sent = [text for _, text in talk.until(13.0)]
     assert [text for text in sent if text.startswith('003003')] == [
         SPEED_ZERO, LIMIT_ZERO] * 3
@@ -388,7 +388,7 @@ def test_look_at_the_maps_shows_nothing_of_a_word_that_was_written_behind_it() -
     assert talk.hears(REQUEST_MAP, 11.004) == [ASK_RESPONSE_MAP]
     assert talk.asks(ControlAction.DISABLE, 11.005) == [DISABLE]
     talk.hears(RESPONSE_MAP, 11.006)
-    assert talk.session.duty.unshown
+    assert talk.session.duty.unacknowledged
 
 
 def test_nor_does_it_when_a_cycle_behind_that_word_was_answered() -> None:
@@ -431,9 +431,9 @@ def test_answer_to_a_cycle_shows_nothing_of_a_word_that_was_written_behind_it() 
     assert talk.until(10.2 + TICK) == [(10.2, NEUTRAL)]
     assert talk.asks(ControlAction.DISABLE, 10.201) == [DISABLE]
     talk.hears(ENABLED, 10.202)
-    assert talk.session.duty.unshown
+    assert talk.session.duty.unacknowledged
     assert exchange(talk, 10.22) == NEUTRAL
-    assert not talk.session.duty.unshown
+    assert not talk.session.duty.unacknowledged
 
 
 @pytest.mark.parametrize('mapping', ['verify', 'assume'])
@@ -472,7 +472,7 @@ def test_drive_whose_cycles_alone_are_dead_is_stopped_by_number() -> None:
     sent = talk.until(10.1621)
     assert [text for _, text in sent[-5:]] == [NEUTRAL, NEUTRAL, *STOPPED_BY_NUMBER]
     assert confirmed(talk, 10.163) == [ASK_REQUEST_MAP]
-    assert not talk.session.duty.owed
+    assert not talk.session.duty.stop_pending
     checked(talk, 10.164)
     assert {text for _, text in talk.until(10.22)} == {NEUTRAL}, 'and is looked for'
     assert warnings(talk) == []
@@ -486,9 +486,9 @@ def test_drive_that_answers_again_was_told_by_its_first_cycle() -> None:
     assert talk.until(10.1101) == [(10.11, ASK_REQUEST_MAP)]
     checked(talk, 10.11)
     assert talk.until(10.1201) == [(10.12, NEUTRAL)]
-    assert talk.session.duty.unshown
+    assert talk.session.duty.unacknowledged
     talk.hears(ANSWER, 10.122)
-    assert not talk.session.duty.unshown
+    assert not talk.session.duty.unacknowledged
     assert warnings(talk) == [says('more_missed_would_hold')]
 
 
@@ -500,7 +500,7 @@ def test_silent_drive_with_assumed_maps_is_told_by_number_when_neutral_cycles_ar
     assert {text for _, text in talk.until(12.0)} <= {
         NEUTRAL, *STOPPED_BY_NUMBER}, 'it is looked for by cycles'
     assert warnings(talk) == [UNHEARD]
-    assert talk.session.duty.owed
+    assert talk.session.duty.stop_pending
     talk.hears(ANSWER, 12.001)
     assert talk.session.online
-    assert not talk.session.duty.owed
+    assert not talk.session.duty.stop_pending

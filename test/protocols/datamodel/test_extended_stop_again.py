@@ -33,7 +33,7 @@ def test_a_drive_that_answers_one_map_only_is_told_to_stop_by_number() -> None:
     assert sent.count(LIMIT_ZERO) == 1
     assert sent.index(SPEED_ZERO) < sent.index(LIMIT_ZERO) < sent.index(ASK_SPEED)
     assert NEUTRAL not in sent
-    assert not (talk.session.duty.owed or talk.session.duty.unshown)
+    assert not (talk.session.duty.stop_pending or talk.session.duty.unacknowledged)
     assert [note.text for note in talk.events(Noted)] == [
         says('stopped_again')]
 
@@ -48,7 +48,7 @@ def test_one_that_is_back_right_after_the_stop_it_has_not_heard_is_told_at_once(
         assert talk.now < 12.0
     sent = [text for _, text in talk.served(talk.now + 0.9, HALF.get)]
     assert sent.count(SPEED_ZERO) == 1
-    assert not (talk.session.duty.owed or talk.session.duty.unshown)
+    assert not (talk.session.duty.stop_pending or talk.session.duty.unacknowledged)
 
 
 def test_one_that_never_confirms_is_told_about_once_a_second() -> None:

@@ -43,10 +43,10 @@ def test_answer_to_an_older_question_does_not_show_that_a_stop_arrived() -> None
     talk = running(command_timeout=0.05)
     assert talk.until(10.09) == [(10.06, SPEED_ZERO)]
     assert talk.hears(ANSWER, 10.091) == []
-    assert talk.session.duty.unshown
+    assert talk.session.duty.unacknowledged
     assert talk.until(10.105) == [(10.1, ASK)]
     assert talk.hears(ANSWER, 10.106) == []
-    assert not talk.session.duty.unshown
+    assert not talk.session.duty.unacknowledged
 
 
 def test_answer_that_finds_a_drive_does_not_show_that_a_stop_arrived() -> None:
@@ -68,7 +68,7 @@ def test_answer_that_finds_a_drive_behind_a_stall_does_not_show_that_either() ->
     talk.hears(ANSWER, 10.023)
     talk.commands(0, 0.0, 10.03)
     assert talk.until(10.0415) == [(10.04, SPEED_ZERO), (10.041, ASK)]
-    talk.time_lost(10.2)
+    talk.handle_stall(10.2)
     told = talk.served(10.3145, {ASK_SPEED: '7F1#E803000000000000',
                                  ASK_LIMIT: '7F1#0000000000000000'}.get)
     assert told[-1] == (10.314, ASK)
@@ -103,10 +103,10 @@ def test_what_expired_in_a_missed_round_is_written_again_behind_an_answer() -> N
     talk = deaf_for_a_round(command_timeout=0.05)
     assert talk.until(10.2405) == [(10.06, SPEED_ZERO), (10.24, ASK)]
     talk.hears(ANSWER, 10.242)
-    assert talk.session.unshown
+    assert talk.session.unacknowledged
     assert talk.until(10.2605) == [(10.243, SPEED_ZERO), (10.26, ASK)]
     talk.hears(ANSWER, 10.262)
-    assert not talk.session.unshown
+    assert not talk.session.unacknowledged
 
 
 def test_a_setpoint_of_a_missed_round_is_written_again_behind_an_answer() -> None:
@@ -224,7 +224,7 @@ def test_a_lost_drive_that_says_it_stands_is_told_once() -> None:
     assert not talk.session.online
     assert told == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED, ASK_LIMIT]
     assert warnings(talk) == []
-    assert not talk.session.duty.owed
+    assert not talk.session.duty.stop_pending
 
 
 # -- setpoints ------------------------------------------------------------------------------------
@@ -421,7 +421,7 @@ def test_silence_before_a_stop_is_confirmed_after_a_stall() -> None:
     talk = moving()
     asked = talk.until(10.0415)[-1]
     assert asked[1] == ASK
-    assert talk.time_lost(12.0) == [SPEED_ZERO]
+    assert talk.handle_stall(12.0) == [SPEED_ZERO]
     assert talk.deactivate(12.0005) == []
     sent = talk.until(12.101)
     assert sent == [(12.001, SPEED_ZERO), (12.002, LIMIT_ZERO), (12.1, ASK_SPEED)]

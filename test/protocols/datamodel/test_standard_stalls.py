@@ -31,7 +31,7 @@ def test_an_answer_that_a_gateway_has_held_is_no_strangers(stall: bool) -> None:
     talk = online()
     assert talk.until(10.0205) == [(10.02, ASK)]
     if stall:
-        talk.time_lost(10.5)
+        talk.handle_stall(10.5)
     else:
         talk.bus_down(10.03)
         talk.bus_up(10.5)
@@ -79,7 +79,7 @@ def test_a_round_from_before_a_stall_says_nothing() -> None:
     assert talk.submits(read(GAIN), 10.03) == ['3F1#0328000100000000']
     assert talk.until(10.0405) == []
     talk.samples()
-    assert talk.time_lost(11.2) == []
+    assert talk.handle_stall(11.2) == []
     assert talk.until(11.35) == [(11.3, ASK)]
     assert talk.hears(ANSWER, 11.351) == []
     assert not talk.session.online

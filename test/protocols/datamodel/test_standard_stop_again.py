@@ -66,7 +66,7 @@ def lost(word: Parameter = WORD, *, end: float = 12.0, **options: object) -> Con
         assert talk.now < 12.0
     talk.until(end)
     assert not talk.session.online
-    assert talk.session.duty.owed
+    assert talk.session.duty.stop_pending
     assert talk.events(Noted) == []
     return talk
 
@@ -79,7 +79,7 @@ def test_a_drive_that_answers_a_part_of_its_round_is_told_again() -> None:
     place = sent.index((told(sent)[0], SPEED_ZERO))
     assert sent[place - 1][1] == ASK_GAIN, 'right behind the first answer'
     assert [text for _, text in sent[place:place + 3]] == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED]
-    assert not talk.session.duty.owed
+    assert not talk.session.duty.stop_pending
     assert [note.text for note in talk.events(Noted)] == [CONFIRMED]
     names = 'actual_speed (P209), motor_current (P210), status_word (P211)'
     assert talk.session.offline_advice == says('one_read_unanswered', names=names)
@@ -93,7 +93,7 @@ def test_one_that_is_back_right_after_the_stop_it_has_not_heard_is_told_at_once(
     assert len(told(sent)) == 1
     place = sent.index((told(sent)[0], SPEED_ZERO))
     assert [text for _, text in sent[:place]].count(ASK_GAIN) == 1, 'right behind the first answer'
-    assert not talk.session.duty.owed
+    assert not talk.session.duty.stop_pending
     assert [note.text for note in talk.events(Noted)] == [CONFIRMED]
 
 
