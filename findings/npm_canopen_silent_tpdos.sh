@@ -6,14 +6,14 @@
 # Of the event-driven types only 254 is looked at, so that a TPDO of type 255 (event-driven as the
 # profile has it) is accepted and stays silent whatever its objects, timer and inhibit time are. The SYNC start value is
 # compared with the second byte of SYNC, which has one: the comparison is never true, and the TPDO waits for ever.
-# And mappings are looked at when the device starts: one that is written by SDO later is acknowledged and read
-# back, and what is sent stays as it was. So a master that writes 1A00h and reads it back decodes other objects
-# than those in the PDO. Use types 254 and 1, no start value, and the mapping of the start.
+# And a mapping that is written by SDO to a node in operational is acknowledged and read back, while what is sent
+# stays as it was, until the node leaves that state and comes back: a master that trusts 1A00h decodes other objects
+# than those in the PDO. Use types 254 and 1, no start value, and write mappings in pre-operational.
 #
 # Shown with the device alone: its "message" events are what it would send. Output seen:
 #   6.2.1: changed once: type 254 sent 1, type 255 sent 0
 #   6.2.1: five SYNCs: start value 0 sent 5, start value 2 sent 0
-#   6.2.1: mapping written true, read as 20020010, PDO still 1111
+#   6.2.1: mapping written true, read as 20020010, PDO still 1111, 2222 behind pre-operational and start
 # Exit code 0: still so; 1: the behaviour has changed; 77: npm, node or the package cannot be had.
 set -eu
 command -v npm > /dev/null && command -v node > /dev/null || exit 77
@@ -76,13 +76,18 @@ async function changed(transmissionType) {
     const read = made.ask('40001a0100000000').readUInt32LE(4).toString(16);
     const before = made.pdos().length;
     made.syncs();
-    lines.push(`mapping written ${written}, read as ${read}, PDO still ${made.pdos()[before].data.toString('hex')}`);
+    const still = made.pdos()[before].data.toString('hex');
+    for (const command of [0x80, 1])
+        made.receive({ id: 0, data: Buffer.from([command, 5]) });
+    made.syncs();
+    lines.push(`mapping written ${written}, read as ${read}, PDO still ${still}, ` +
+        `${made.pdos().at(-1).data.toString('hex')} behind pre-operational and start`);
     for (const line of lines)
         console.log(`6.2.1: ${line}`);
     process.exit(JSON.stringify(lines) === JSON.stringify([
         'changed once: type 254 sent 1, type 255 sent 0',
         'five SYNCs: start value 0 sent 5, start value 2 sent 0',
-        'mapping written true, read as 20020010, PDO still 1111']) ? 0 : 1);
+        'mapping written true, read as 20020010, PDO still 1111, 2222 behind pre-operational and start']) ? 0 : 1);
 })();
 JAVASCRIPT
 node shown.js
