@@ -30,12 +30,14 @@ class Partner(Pair):
     :cvar unknown: what is said of a parameter that the drive does not have.
     :cvar idle: state of a drive that has just been found.
     :cvar words: disable and enable, where the control word is built in.
+    :cvar parameters: how frames begin by which a user reads and writes 30 to 42.
     """
 
     sample: tuple[int, ...] = (1000, 250, 1)
     unknown = 'no answer'
     idle = DriveState.NOT_ARMED
     words: Mapping[str, int] = {}
+    parameters: str
 
     device: CannordDrive | ExtendedDrive | StandardDrive | PkwNode | ServoDrive
 
@@ -100,6 +102,8 @@ class Partner(Pair):
 class ExtendedPartner(Partner):
     """DataModel with 29-bit identifiers."""
 
+    parameters = '00[23]0(01|02)'
+
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         self.registers.update(zip(range(122, 130), (50, 0, 0, 0, 209, 210, 211, 0)))
@@ -115,6 +119,8 @@ class ExtendedPartner(Partner):
 
 class StandardPartner(Partner):
     """DataModel with 11-bit identifiers."""
+
+    parameters = '3F1#0[36](1|2)'
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
@@ -136,6 +142,7 @@ class CannordPartner(Partner):
     sample = (0x0B31, 1000, 250)
     idle = DriveState.DISABLED
     words = {'disable': 0x047E, 'enable': 0x047F}
+    parameters = '202#'
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
@@ -161,6 +168,7 @@ class PkwPartner(Partner):
     """PKW, node 1; obeys the rule that only a change of the function byte counts."""
 
     unknown = 'refused by the drive: 06020000h (no such register or object)'
+    parameters = '501#(1|2)'
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
@@ -183,6 +191,7 @@ class Cia402Partner(Partner):
     unknown = 'refused by the drive: 06020000h (no such register or object)'
     idle = DriveState.DISABLED
     words = {'disable': 0x0006, 'enable': 0x007F}
+    parameters = '601#..(1|2).20'
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)

@@ -47,6 +47,14 @@ class Timeline:
         talk = self.talk
         self._coming.live(talk, end, due=talk.session.next_timer,
                           timers=lambda: self.took(talk.at(talk.now)))
+        talk.now = max(talk.now, end)
+
+    def stall(self, seconds: float) -> None:
+        """Stand still; then the reader goes first, with all that has arrived, and goes on."""
+        self.talk.now += seconds
+        for _ in range(30):
+            if self._coming:
+                self._coming.arrives()
 
     def when(self, *texts: str) -> list[float]:
         """Return when any of these frames was sent."""

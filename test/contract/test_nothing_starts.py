@@ -11,82 +11,28 @@ A motor may start only after an ``~/enable`` that has not failed, and that nothi
 but for a moment after it was stopped at the drive: that is what nobody can know yet.
 """
 
-from collections.abc import Callable
 import math
-from typing import Any
 
 from any_order import PATIENCE
-from builders import (
-    ACTUAL, CONTROL, CURRENT, drive, frame, INT16, LIMIT, parameter, SPEED, STATUS,
-    TARGET_VELOCITY, TESYS, TESYS_CONTROL, TESYS_SPEED, TESYS_STATUS, TESYS_WORD, WORD,
-)
+from builders import frame
 from conversation import Conversation
-from drives import (
-    CannordDrive, ExtendedDrive, Motor, MotorServo, PkwNode, ServoDrive, StandardDrive,
-)
+from drives import Motor, PkwNode, ServoDrive
 from hypothesis import example, given, strategies as st
+import kinds
 import pytest
 from timeline import Timeline
 
-from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import StationFound, StationLost
-from drive_can_bridge.core.parameters import Parameter
 
-PERIOD = 0.02
 #: s until a frame is answered
 DELAY = 0.002
 #: s without power that a drive may lose its setpoint in between two frames
 SHORTEST_FAILURE = 0.005
 #: raw value of the setpoint after a power failure
 PRESET = 500
-FREQUENCY = parameter('frequency_setpoint', None, type=INT16)
-def datamodel(slot: int = 0) -> Motor:
-    """Return what has its control word in the third request slot, or by number only."""
-    return Motor({50: PRESET, 51: 0, 209: 0, 210: 0,
-                  **dict(zip(range(122, 130), (50, 51, slot, 0, 209, 210, 211, 0)))})
-
-
-def tesys() -> PkwNode:
-    node = PkwNode(5, Motor({710: PRESET}, setpoint=710, word=704, status=455, bits=(1, 0x80, 4)))
-    node.operational = True
-    return node
-
-
-def drive_of(protocol: str, *more: Parameter, **options: Any) -> DriveConfiguration:
-    """Configure a drive; ``more`` is sent with its setpoints."""
-    return drive(protocol, control=CONTROL, period=PERIOD, request=(SPEED, LIMIT, *more),
-                 response=(ACTUAL, CURRENT, STATUS), **options)
-
-
-def tesys_of(*more: Parameter) -> DriveConfiguration:
-    return drive('canopen_pkw', station=5, table=TESYS, control=TESYS_CONTROL, period=0.1,
-                 request=(TESYS_SPEED, *more), response=(TESYS_STATUS,),
-                 parameter_timeout=0.5, refresh_interval=0.15)
-
-
-#: how a drive is set up, and how long (s) what happened in it may be unknown
-KINDS: dict[str, tuple[Callable[[], Any], Callable[[], DriveConfiguration], float]] = {
-    '29 bit, by number': (lambda: ExtendedDrive(datamodel()),
-                          lambda: drive_of('datamodel_extended'), 0.0),
-    '29 bit, in its slot': (lambda: ExtendedDrive(datamodel(slot=52)),
-                            lambda: drive_of('datamodel_extended', WORD), 4 * PERIOD),
-    '11 bit, by number': (lambda: StandardDrive(datamodel()),
-                          lambda: drive_of('datamodel_standard'), 0.0),
-    '11 bit, with its setpoints': (
-        lambda: StandardDrive(datamodel()),
-        lambda: drive_of('datamodel_standard', WORD, refresh_interval=0.05), 0.005),
-    'PKW, by number': (tesys, tesys_of, 0.0),
-    'PKW, with its setpoints': (tesys, lambda: tesys_of(TESYS_WORD), 0.11),
-    'CiA 402': (
-        lambda: MotorServo(1, Motor({50: PRESET}), {(0x6064, 0): bytes(4)}),
-        lambda: drive('cia402', mode='pv', table=(TARGET_VELOCITY,), request=(TARGET_VELOCITY,),
-                      response=(), period=PERIOD, parameter_timeout=0.1, heartbeat_producer=0.0,
-                      heartbeat_timeout=0.0), 0.0),
-    'CANnord': (lambda: CannordDrive(1, Motor({50: PRESET})), lambda: drive(
-        'cannord', table=(FREQUENCY,), request=(FREQUENCY,), response=(), period=PERIOD),
-        4 * PERIOD),
-}
+#: drives of one session that have a control word
+KINDS = [kind for kind in kinds.KINDS if 'no word' not in kind and 'group' not in kind]
 
 
 class Story:
@@ -98,12 +44,13 @@ class Story:
     """
 
     def __init__(self, kind: str) -> None:
-        make, configure, self.unknown = KINDS[kind]
-        self.device = make()
+        row = kinds.KINDS[kind]
+        self.unknown = 0.0 if 'by number' in kind else row.unseen
+        self.device = row.make(lambda begins, moves: begins and self.starts(), 0)
         self.motor: Motor = self.device.registers
-        self.motor.moved = lambda begins, moves: begins and self.starts()
+        self.motor.restarts(PRESET)
         self.powered = True
-        self.talk = Conversation(configure())
+        self.talk = Conversation(*row.configure())
         self.line = Timeline(self.talk, self.answer)
         self.kind = kind
         self.allowed = self.enabling = False
@@ -155,9 +102,7 @@ class Story:
     # -- what happens -----------------------------------------------------------------------------
 
     def passes(self, seconds: float) -> None:
-        end = self.talk.now + seconds
-        self.line.live(end)
-        self.talk.now = end
+        self.line.live(self.talk.now + seconds)
         self.look()
 
     def asks(self, action: ControlAction) -> None:
