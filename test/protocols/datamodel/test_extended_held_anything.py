@@ -10,11 +10,12 @@ run, or a command that was accepted; and without control none is sent before one
 import math
 from typing import Any
 
-from any_order import AnyOrder, Observer, PATIENCE, SETTINGS
+from any_order import Observer, PATIENCE, SETTINGS
 from builders import CONTROL, drive, GAIN, INT16, parameter, RAM, RO, STATUS, WORD
+from datamodel_anything import CYCLIC, ExtendedMachine
 from drives import ExtendedDrive
 from hypothesis import strategies as st
-from hypothesis.stateful import initialize, precondition, rule
+from hypothesis.stateful import initialize, rule
 import pytest
 
 from drive_can_bridge.core.control import ControlAction
@@ -24,7 +25,6 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES
 
-CYCLIC = 0x003FFFF0
 POSITION = parameter('position_setpoint', 60, type=INT16, scale=0.1, unit='deg', minimum=-100.0,
                      maximum=100.0, storage=RAM, neutral_from='actual_position',
                      arming_tolerance=0.5)
@@ -126,13 +126,11 @@ class AxisObserver(Observer):
         self.last = position
 
 
-class AxisMachine(AnyOrder):
+class AxisMachine(ExtendedMachine):
     """Everything that may happen to the session of an axis."""
 
     readable = (GAIN, MEASURED, STATUS)
     writable = (GAIN,)
-    stop_takes = 2.0
-    bus_may_refuse = True
 
     @initialize(mapping=st.sampled_from(['verify', 'configure', 'assume']),
                 timeout=st.sampled_from([0.0, 0.05]), control=st.booleans())
@@ -145,11 +143,11 @@ class AxisMachine(AnyOrder):
         self.maps = ((52, 60) if control else (60, 0), (211, 212))
         self.registers = dict.fromkeys((40, 52, 60, 211), 0)
         self.registers[212] = 700
-        self.drive_is_repaired()
+        self.map_is_repaired()
         self.device = ExtendedDrive(self.registers)
         self.step = 0
 
-    def drive_is_repaired(self) -> None:
+    def map_is_repaired(self) -> None:
         request, response = self.maps
         self.registers.update(zip(range(122, 130), (*request, 0, 0, *response, 0, 0)))
 
@@ -161,22 +159,8 @@ class AxisMachine(AnyOrder):
         elif isinstance(event, StationFound):
             observer.online = True
 
-    def apply(self, sent: Frame) -> None:
-        if sent.identifier != CYCLIC and sent.identifier & 0x100000:
-            self.device.takes(sent)
-        else:
-            self.unanswered.append(sent)
-            del self.unanswered[:-3]
-
-    @precondition(lambda self: self.unanswered)
-    @rule(choice=st.integers(0, 2))
-    def drive_answers(self, choice: int) -> None:
-        asked = self.unanswered.pop(min(choice, len(self.unanswered) - 1))
-        for answer in self.device.takes(asked):
-            self.registers[212] = self.registers[212] + self.step & 0xFFFF     # it never rests
-            self.hears(answer)
-
     def hears(self, heard: Frame) -> None:
+        self.registers[212] = self.registers[212] + self.step & 0xFFFF     # it never rests
         session, observer = self.session, self.observer
         words = [int.from_bytes(heard.data[place:place + 2], 'big') for place in (0, 2)]
         before = observer.reported, observer.running_said
@@ -236,10 +220,6 @@ class AxisMachine(AnyOrder):
         self.command(0.0, 3)
         self.command(99.0, 0)
         self.time_passes_in_time(2, True)
-
-    def drive_is_well(self) -> None:
-        self.drive_is_repaired()
-        super().drive_is_well()
 
 
 TestAxis = AxisMachine.TestCase

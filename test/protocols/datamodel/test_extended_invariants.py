@@ -9,25 +9,23 @@ its own books: which maps were read, which commands went through, when an EEPROM
 import math
 from typing import Any
 
-from any_order import AnyOrder, Observer, PATIENCE, SETTINGS, SLACK
+from any_order import Observer, PATIENCE, SETTINGS, SLACK
 from builders import (
     CONTROL, DAMPING, drive, FLAG, GAIN, LIMIT, MAXIMUM, ORDER, parameter, RAMP, SPEED, STATUS,
     WORD,
 )
+from datamodel_anything import CYCLIC, ExtendedMachine, TwoSetpoints
 from drives import ExtendedDrive
 from hypothesis import strategies as st
-from hypothesis.stateful import initialize, precondition, rule
+from hypothesis.stateful import initialize, rule
 import pytest
 from stops import MORE_CYCLES, STOP_CYCLES
 
-from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import MappingDiffered, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES
 
-CYCLIC = 0x003FFFF0
 RAW = parameter('p600', 600, listed=False)
 WRITABLE = (GAIN, DAMPING, FLAG, RAMP, MAXIMUM, ORDER, RAW)
 #: what stops the drive by number: setpoints and control word
@@ -155,13 +153,11 @@ class ExtendedObserver(Observer):
             self.tells('cycle', runs=False)
 
 
-class SessionMachine(AnyOrder):
+class SessionMachine(TwoSetpoints, ExtendedMachine):
     """Everything that may happen to a session."""
 
     readable = (GAIN, DAMPING, FLAG, RAMP, MAXIMUM, STATUS, RAW)
     writable = WRITABLE
-    stop_takes = 2.0
-    bus_may_refuse = True
 
     @initialize(mapping=st.sampled_from(['verify', 'configure', 'assume']),
                 period=st.sampled_from([0.02, 0.005, 0.3]),
@@ -197,21 +193,7 @@ class SessionMachine(AnyOrder):
         elif isinstance(event, StationFound):
             self.observer.online = True
 
-    def apply(self, sent: Frame) -> None:
-        if sent.identifier != CYCLIC and sent.identifier & 0x100000:
-            self.device.takes(sent)
-        else:
-            self.unanswered.append(sent)
-            del self.unanswered[:-3]
-
     # -- the drive --------------------------------------------------------------------------------
-
-    @precondition(lambda self: self.unanswered)
-    @rule(choice=st.integers(0, 2))
-    def drive_answers(self, choice: int) -> None:
-        asked = self.unanswered.pop(min(choice, len(self.unanswered) - 1))
-        for answer in self.device.takes(asked):
-            self.hears(answer)
 
     def hears(self, heard: Frame) -> None:
         self.keep_books(heard)
@@ -255,39 +237,6 @@ class SessionMachine(AnyOrder):
         data=st.binary(max_size=8), is_extended=st.booleans())
     def anything_arrives(self, identifier: int, data: bytes, is_extended: bool) -> None:
         self.hears(Frame(identifier if is_extended else identifier & 0x7FF, data, is_extended))
-
-    # -- users ------------------------------------------------------------------------------------
-
-    @rule(index=st.integers(0, 1), value=st.sampled_from([0.0, 5.0, 7.5]))
-    def good_command(self, index: int, value: float) -> None:
-        self.command(index, value)
-        self.time_passes_in_time(4, True)
-
-    @rule(index=st.integers(0, 1), value=st.sampled_from([0.0, 0.1, 5.0, 5, math.nan, 1e6, True]))
-    def command(self, index: int, value: float) -> None:
-        try:
-            outcome = self.session.services.command(index, value, self.now)
-        except ValueRefused:
-            assert not 0 <= value <= 5 or value is True
-            return
-        self.observer.expected(self.now)
-        self.observer.commanded(index, round(10 * value), outcome, self.now)
-        self.look()
-
-    def have_it_run(self) -> None:
-        if self.observer.controlled:
-            self.registers[211] = 1
-            self.control(ControlAction.ENABLE)
-            self.time_passes_in_time(8, True)
-            self.registers[211] = 3
-            self.time_passes_in_time(8, True)
-        self.command(0, 0.0)
-        self.command(0, 5.0)
-        self.time_passes_in_time(2, True)
-
-    def drive_is_well(self) -> None:
-        self.map_is_repaired()
-        super().drive_is_well()
 
 
 TestSession = SessionMachine.TestCase

@@ -9,18 +9,19 @@ its own books: which read is open, until when there has to be silence, which com
 import math
 from typing import Any, NamedTuple
 
-from any_order import AnyOrder, Observer, PATIENCE, SETTINGS, SLACK
+from any_order import Observer, PATIENCE, SETTINGS, SLACK
 from builders import (
     ACTUAL, CONTROL, CURRENT, DAMPING, drive, FLAG, GAIN, KEY, LIMIT, MAXIMUM, ORDER, parameter,
     RAMP, RO, SPEED, STATUS, WORD,
 )
+from datamodel_anything import TwoSetpoints
 from drives import StandardDrive
 from hypothesis import example, given, strategies as st
 from hypothesis.stateful import initialize, invariant, precondition, rule
 import pytest
 
 from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.errors import RemoteProtocolError, ValueRefused
+from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import ProcessDataReceived, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.setpoints import CommandOutcome
@@ -233,13 +234,15 @@ class StandardObserver(Observer):
             self.asked = None
 
 
-class SessionMachine(AnyOrder):
+class SessionMachine(TwoSetpoints):
     """Everything that may happen to a session."""
 
     readable = (GAIN, DAMPING, FLAG, RAMP, MAXIMUM, STATUS, FAR, RAW)
     writable = WRITABLE
     stop_takes = 2.0
     bus_may_refuse = True
+    settles = 20, 6
+    silent = True
 
     @initialize(period=st.sampled_from([0.02, 0.02, 0.3]), timeout=st.sampled_from([0.0, 0.05]),
                 immediate=st.booleans(), control=st.sampled_from(['', 'listed', 'by hand']),
@@ -330,37 +333,11 @@ class SessionMachine(AnyOrder):
 
     # -- users ------------------------------------------------------------------------------------
 
-    @rule(index=st.integers(0, 1), value=st.sampled_from([0.0, 5.0, 7.5]))
-    def good_command(self, index: int, value: float) -> None:
-        self.command(index, value)
-        self.time_passes_in_time(4, True)
-
-    @rule(index=st.integers(0, 1), value=st.sampled_from([0.0, 0.1, 5.0, 5, math.nan, 1e6, True]))
-    def command(self, index: int, value: float) -> None:
-        try:
-            outcome = self.session.services.command(index, value, self.now)
-        except ValueRefused:
-            assert not 0 <= value <= 5 or value is True
-            return
-        self.observer.commanded(index, round(10 * value), outcome, self.now)
-        self.look(silent=True)
-
     @rule(index=st.integers(0, 1), value=st.sampled_from([5.0, 7.5]))
     def commander_falls_silent(self, index: int, value: float) -> None:
         self.command(index, 0.0)
         self.command(index, value)
         self.time_passes_in_time(40, True)
-
-    def have_it_run(self) -> None:
-        if self.observer.controlled:
-            self.registers[211] = 1
-            self.control(ControlAction.ENABLE)
-            self.time_passes_in_time(20, True)
-            self.registers[211] = 3
-            self.time_passes_in_time(20, True)
-        self.command(0, 0.0)
-        self.command(0, 5.0)
-        self.time_passes_in_time(6, True)
 
     def wanted(self, action: ControlAction) -> None:
         if action is ControlAction.ENABLE:
