@@ -1,6 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Commands of the package as processes, and the terminal that they may have."""
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 import fcntl
 import os
 from pathlib import Path
@@ -89,6 +91,22 @@ class Running:
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait()
+        if self.process.stdin is not None:
+            self.process.stdin.close()
+
+
+@contextmanager
+def starting(directory: Path, *words: str, **usual: Any) -> Iterator[Callable[..., Running]]:
+    """Return what starts a command, each time in a directory of its own; they end with this."""
+    running: list[Running] = []
+
+    def start(*more: str, **options: Any) -> Running:
+        running.append(Running(directory / str(len(running)), *words, *more,
+                               **{**usual, **options}))
+        return running[-1]
+    yield start
+    for each in reversed(running):
+        each.close()
 
 
 class Terminal:

@@ -30,17 +30,14 @@ import tempfile
 import time
 from typing import Any
 
-import yaml
+import plant
 
 HERE = Path(__file__).parent
 #: s after which a thing that has not happened never will
 DEADLINE = 120.0
 DRIVE = '/both/conveyor'
-CONVEYOR = {
-    'bus': 'main', 'protocol': 'datamodel_extended', 'station': 1, 'profile': 'datamodel_example',
-    'period': 0.02, 'cyclic_request': ['speed_setpoint', 'torque_limit'],
-    'cyclic_response': ['actual_speed', 'motor_current', 'status_word'],
-    'command_timeout': 5.0, 'missed_limit': 25, 'parameter_timeout': 0.3}
+CONVEYOR = {**plant.CONVEYOR, 'period': 0.02, 'command_timeout': 5.0, 'missed_limit': 25,
+            'parameter_timeout': 0.3}
 #: what is between them -> what Fast DDS may use, whether the client has another host
 WAYS = {'one host': ('DEFAULT', False), 'UDP alone': ('UDPv4', False),
         'two hosts': ('DEFAULT', True)}
@@ -197,10 +194,9 @@ def story(bridge: Place, other: Place, folder: Path) -> None:
     """Move a conveyor from the other side, look at it, write to it, and stop it."""
     link = folder / 'links' / 'main'
     file = folder / 'bridge.yaml'
-    file.write_text(yaml.safe_dump({'/**/drive_can_bridge': {'ros__parameters': {
-        'diagnostics_period': 0.5, 'drives': {'conveyor': CONVEYOR},
-        'buses': {'main': {'interface': 'slcan', 'channel': str(link), 'bitrate': 125_000,
-                           'reconnect_period': 0.2}}}}}), encoding='utf-8')
+    buses = {'main': {**plant.SLCAN, 'channel': str(link), 'bitrate': 125_000}}
+    file.write_text(plant.text({'conveyor': CONVEYOR}, diagnostics_period=0.5, buses=buses),
+                    encoding='utf-8')
     bridge.run('simulator', '-m', 'drive_can_bridge.cli.start', 'simulate', '--params-file',
                str(file), '--pty-link', str(link.parent))
     wait_for(link.is_symlink, 'the simulated drive')

@@ -3,13 +3,12 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-import copy
 import itertools
 from pathlib import Path
 from typing import Any
 
+import plant
 import world
-import yaml
 
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.frame import Frame
@@ -17,23 +16,10 @@ from drive_can_bridge.simulation.simulation import PlayedDrive, Simulation
 
 _COUNTER = itertools.count(1)
 
-CONVEYOR: dict[str, Any] = {
-    'bus': 'main', 'protocol': 'datamodel_extended', 'station': 1, 'profile': 'datamodel_example',
-    'cyclic_request': ['speed_setpoint', 'torque_limit'],
-    'cyclic_response': ['actual_speed', 'motor_current', 'status_word'],
-    'parameter_timeout': 0.3}
-LIFT: dict[str, Any] = {
-    'bus': 'main', 'protocol': 'datamodel_standard', 'station': 2,
-    'profile': 'datamodel_control_example', 'cyclic_request': ['control_word', 'speed_setpoint'],
-    'cyclic_response': ['status_word', 'actual_speed'], 'period': 0.05,
-    'parameter_timeout': 0.3}
-MIXER: dict[str, Any] = {
-    'bus': 'main', 'protocol': 'cannord', 'station': 50, 'profile': 'nord_sk500e',
-    'cyclic_request': ['frequency_setpoint'], 'cyclic_response': ['actual_frequency'],
-    'parameter_timeout': 0.3}
-PUMP: dict[str, Any] = {
-    'bus': 'main', 'protocol': 'canopen_pkw', 'station': 5, 'profile': 'tesys_t_ltmr',
-    'cyclic_response': ['system_status_1'], 'period': 0.1}
+CONVEYOR = {**plant.CONVEYOR, 'parameter_timeout': 0.3}
+LIFT = {**plant.LIFT, 'protocol': 'datamodel_standard', 'period': 0.05, 'parameter_timeout': 0.3}
+MIXER = {**plant.MIXER, 'parameter_timeout': 0.3}
+PUMP = plant.PUMP
 ALL = {'conveyor': CONVEYOR, 'lift': LIFT, 'mixer': MIXER, 'pump': PUMP}
 
 
@@ -41,12 +27,10 @@ def parameter_file(directory: Path, drives: dict[str, dict[str, Any]],
                    **bus: Any) -> Path:
     """Write a parameter file with a virtual bus that nobody else has."""
     number = next(_COUNTER)
-    content = {'buses': {'main': {'interface': 'virtual', 'channel': f'client_test_{number}',
-                                  'bitrate': 1_000_000, **bus}},
-               'drives': copy.deepcopy(drives)}
     file = directory / f'drives_{number}.yaml'
-    file.write_text(yaml.dump({'/**/drive_can_bridge': {'ros__parameters': content}},
-                              sort_keys=False), encoding='utf-8')
+    file.write_text(plant.text(drives, buses={'main': {
+        'interface': 'virtual', 'channel': f'client_test_{number}', 'bitrate': 1_000_000, **bus}}),
+        encoding='utf-8')
     return file
 
 

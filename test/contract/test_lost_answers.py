@@ -46,7 +46,9 @@ class Story(Line):
     def asks(self, request: ReadRequest | WriteRequest) -> object:
         """Return what became of a request."""
         self.submits(request)
+        end = self.talk.now + 30.0
         while not (outcomes := self.talk.outcomes()):
+            assert self.talk.now < end
             self.passes(0.001)
         return outcomes[0][0]
 

@@ -3,10 +3,9 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
-from running import Running, Terminal
+from running import Running, starting, Terminal
 
 Start = Callable[..., Running]
 
@@ -14,14 +13,8 @@ Start = Callable[..., Running]
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Start]:
     """Return what starts a demo with arguments."""
-    demos: list[Running] = []
-
-    def start_one(*arguments: str, **options: Any) -> Running:
-        demos.append(Running(tmp_path, 'drive_can', 'demo', *arguments, **options))
-        return demos[-1]
-    yield start_one
-    for demo in demos:
-        demo.close()
+    with starting(tmp_path, 'drive_can', 'demo') as start_one:
+        yield start_one
 
 
 @pytest.fixture

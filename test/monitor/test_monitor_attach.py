@@ -11,8 +11,9 @@ import sys
 from types import ModuleType
 
 from clocks import REAL
+import plant
 import pytest
-from running import Running, Terminal
+from running import Running, starting, Terminal
 from waiting import wait_for
 from world import World, world
 
@@ -23,44 +24,19 @@ from drive_can_bridge.monitor.model import Model
 
 pytest.importorskip('rclpy')
 
-FILE = """
-/**/drive_can_bridge:
-  ros__parameters:
-    diagnostics_period: 0.5
-    buses:
-      main: {interface: slcan, channel: somewhere, bitrate: 500000, reconnect_period: 0.2}
-    drives:
-      conveyor:
-        bus: main
-        protocol: datamodel_extended
-        station: 1
-        profile: datamodel_example
-        missed_limit: 1000
-        cyclic_request: [speed_setpoint]
-        cyclic_response: [actual_speed, status_word]
-      lift:
-        bus: main
-        protocol: datamodel_extended
-        station: 2
-        profile: datamodel_control_example
-        missed_limit: 1000
-        cyclic_request: [control_word, speed_setpoint]
-        cyclic_response: [status_word]
-"""
+FILE = plant.text({
+    'conveyor': {**plant.CONVEYOR, 'missed_limit': 1000, 'cyclic_request': ['speed_setpoint'],
+                 'cyclic_response': ['actual_speed', 'status_word']},
+    'lift': {**plant.LIFT, 'missed_limit': 1000, 'cyclic_response': ['status_word']}},
+    diagnostics_period=0.5, buses={'main': plant.SLCAN})
 Run = Callable[..., Running]
 
 
 @pytest.fixture
 def run(tmp_path: Path) -> Iterator[Run]:
     """Return what starts commands of the package, each with a directory of its own."""
-    running: list[Running] = []
-
-    def start(*command: str, **options: object) -> Running:
-        running.append(Running(tmp_path / str(len(running)), *command, **options))
-        return running[-1]
-    yield start
-    for each in running:
-        each.close()
+    with starting(tmp_path) as start:
+        yield start
 
 
 def bridge(run: Run, directory: Path, namespace: str = '') -> Running:

@@ -7,7 +7,7 @@ from typing import Any, TYPE_CHECKING
 
 from panel_builders import Run, Site
 import pytest
-from running import Running
+from running import starting
 
 if TYPE_CHECKING:
     from panel_bench import House
@@ -50,14 +50,8 @@ def somebody(site: Site) -> Iterator['Somebody']:
 @pytest.fixture(scope='module')
 def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
     """Return what starts commands of the package, each with a directory of its own."""
-    running: list[Running] = []
-
-    def start(*command: str, **options: object) -> Running:
-        running.append(Running(tmp_path_factory.mktemp('run'), *command, **options))
-        return running[-1]
-    yield start
-    for each in reversed(running):
-        each.close()
+    with starting(tmp_path_factory.mktemp('run')) as start:
+        yield start
 
 
 @pytest.fixture(scope='module')

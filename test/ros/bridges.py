@@ -14,12 +14,12 @@ from typing import Any
 
 import can
 from clients import wait_until
+import plant
 import rclpy
 from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
 import waiting
 import world
-import yaml
 
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.frame import Frame
@@ -34,18 +34,10 @@ _COUNTER = itertools.count(1)
 MARK = 0x7FF
 
 #: generous: nothing may depend on how busy the machine is
-CONVEYOR: dict[str, Any] = {
-    'bus': 'main', 'protocol': 'datamodel_extended', 'station': 1, 'profile': 'datamodel_example',
-    'period': 0.02, 'cyclic_request': ['speed_setpoint', 'torque_limit'],
-    'cyclic_response': ['actual_speed', 'motor_current', 'status_word'],
-    'command_timeout': 20.0, 'missed_limit': 100, 'parameter_timeout': 2.0,
-}
-#: the same with a control word
-LIFT: dict[str, Any] = {
-    **CONVEYOR, 'station': 2, 'profile': 'datamodel_control_example',
-    'cyclic_request': ['control_word', 'speed_setpoint'],
-    'cyclic_response': ['status_word', 'actual_speed'], 'control_timeout': 20.0,
-}
+GENEROUS = {'period': 0.02, 'command_timeout': 20.0, 'missed_limit': 100,
+            'parameter_timeout': 2.0}
+CONVEYOR: dict[str, Any] = {**plant.CONVEYOR, **GENEROUS}
+LIFT: dict[str, Any] = {**plant.LIFT, **GENEROUS, 'control_timeout': 20.0}
 #: drives that tell soon when something is missing, for the tests of what happens then
 HASTY: dict[str, Any] = {'missed_limit': 10, 'parameter_timeout': 0.2}
 
@@ -83,8 +75,7 @@ class Bridge:
             content = copy.deepcopy(content or parameters())
             for name, bus in content['buses'].items():
                 bus.setdefault('channel', f'ros_test_{number}_{name}')
-            content = yaml.dump({key: {'ros__parameters': content}}, Dumper=_Dumper,
-                                sort_keys=False)
+            content = plant.text(content.pop('drives'), node=key, **content)
         self.file.write_text(content, encoding='utf-8')
         self._simulated = simulated
         self._autostart = autostart
@@ -265,10 +256,3 @@ def acyclic(recorder: Recorder) -> list[tuple[int, bytes]]:
     return [(identifier, data) for identifier, data in recorder.frames()
             if identifier >> 21 == 1 and identifier & 0x1FFFF0 != 0x1FFFF0
             and not 122 <= (identifier >> 4 & 0xFFFF) <= 129]
-
-
-class _Dumper(yaml.SafeDumper):
-    """Without aliases: rcl knows none."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True

@@ -11,6 +11,7 @@ from builders import RAMP
 from clients import Client, wait_until
 from graph_builders import answer, hang, offer
 from lifecycle_msgs.srv import ChangeState
+import plant
 import pytest
 from rcl_interfaces.srv import GetParameterTypes, ListParameters, SetParameters
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -27,13 +28,8 @@ from drive_can_bridge.core.parameters import AccessMode, Storage
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.ros.client import calls, graph, search
 
-PUMP: dict[str, Any] = {
-    'bus': 'main', 'protocol': 'canopen_pkw', 'station': 5, 'profile': 'tesys_t_ltmr',
-    'cyclic_response': ['system_status_1'], 'period': 0.1, 'missed_limit': 100}
-MIXER: dict[str, Any] = {
-    'bus': 'main', 'protocol': 'cannord', 'station': 50, 'profile': 'nord_sk500e',
-    'cyclic_request': ['frequency_setpoint'], 'cyclic_response': ['actual_frequency'],
-    'missed_limit': 100, 'parameter_timeout': 2.0}
+PUMP = {**plant.PUMP, 'missed_limit': 100}
+MIXER = {**plant.MIXER, 'missed_limit': 100, 'parameter_timeout': 2.0}
 
 
 def reasons(outcomes: dict[str, Any]) -> dict[str, str]:

@@ -12,8 +12,9 @@ import time
 from typing import Any
 from xml.etree import ElementTree
 
+import plant
 import pytest
-from running import Running
+from running import Running, starting
 import waiting
 from waiting import wait_for
 from world import world
@@ -23,42 +24,20 @@ from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import StopAction
 from drive_can_bridge.resources import config_file
 
-FILE = """
-/**/drive_can_bridge:
-  ros__parameters:
-    buses:
-      main: {interface: slcan, channel: somewhere, bitrate: 500000, reconnect_period: 0.2}
-    drives:
-      conveyor:
-        bus: main
-        protocol: datamodel_extended
-        station: 1
-        profile: datamodel_example
-        cyclic_request: [speed_setpoint]
-        cyclic_response: [actual_speed, status_word]
-        joint: {name: conveyor_joint, velocity: actual_speed, velocity_command: speed_setpoint}
-      lift:
-        bus: main
-        protocol: datamodel_extended
-        station: 2
-        profile: datamodel_control_example
-        cyclic_request: [control_word, speed_setpoint]
-        cyclic_response: [status_word, actual_speed]
-"""
+FILE = plant.text({
+    'conveyor': {**plant.CONVEYOR, 'cyclic_request': ['speed_setpoint'],
+                 'cyclic_response': ['actual_speed', 'status_word'],
+                 'joint': {'name': 'conveyor_joint', 'velocity': 'actual_speed',
+                           'velocity_command': 'speed_setpoint'}},
+    'lift': plant.LIFT}, buses={'main': plant.SLCAN})
 Run = Callable[..., Running]
 
 
 @pytest.fixture
 def run(tmp_path: Path) -> Iterator[Run]:
     """Return what starts commands of the package, each with a directory of its own."""
-    running: list[Running] = []
-
-    def start(*command: str, **options: object) -> Running:
-        running.append(Running(tmp_path / str(len(running)), *command, **options))
-        return running[-1]
-    yield start
-    for each in reversed(running):
-        each.close()
+    with starting(tmp_path) as start:
+        yield start
 
 
 def written(tmp_path: Path, *arguments: str) -> ElementTree.Element:

@@ -11,8 +11,9 @@ import subprocess
 from typing import Any
 
 import can
+import plant
 import pytest
-from running import Running
+from running import Running, starting
 from simulation_builders import RULES
 from waiting import wait_for
 
@@ -22,45 +23,20 @@ from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.exchange.one_master import END_FIRST, InUse, Ownership
 
-PARAMETERS = """
-/**/drive_can_bridge:
-  ros__parameters:
-    buses:
-      main: {interface: virtual, channel: x}
-      second: {interface: virtual, channel: x2}
-    drives:
-      conveyor:
-        bus: main
-        protocol: datamodel_extended
-        station: 1
-        profile: datamodel_example
-        cyclic_request: [speed_setpoint, torque_limit]
-        cyclic_response: [actual_speed, motor_current, status_word]
-      lift:
-        bus: second
-        protocol: datamodel_extended
-        station: 2
-        profile: datamodel_example
-        cyclic_request: [speed_setpoint]
-        cyclic_response: [actual_speed]
-"""
+PARAMETERS = plant.text({
+    'conveyor': plant.CONVEYOR,
+    'lift': {**plant.CONVEYOR, 'bus': 'second', 'station': 2, 'cyclic_request': ['speed_setpoint'],
+             'cyclic_response': ['actual_speed']}},
+    buses={'main': plant.VIRTUAL, 'second': {**plant.VIRTUAL, 'channel': 'x2'}})
 
 
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Callable[..., Running]]:
-    running: list[Running] = []
     file = tmp_path / 'bridge.yaml'
     file.write_text(PARAMETERS, encoding='utf-8')
-
-    def make(*arguments: str, **options: Any) -> Running:
-        running.append(Running(tmp_path, 'drive_can', 'simulate', '--params-file', str(file),
-                               *arguments, **{'stdin': subprocess.PIPE, **options}))
-        return running[-1]
-    yield make
-    for command in running:
-        command.close()
-        if command.process.stdin is not None:
-            command.process.stdin.close()
+    with starting(tmp_path, 'drive_can', 'simulate', '--params-file', str(file),
+                  stdin=subprocess.PIPE) as make:
+        yield make
 
 
 def write(command: Running, text: str) -> None:
@@ -233,7 +209,8 @@ class TestASerialPort:
     @pytest.fixture(name='file')
     def file_fixture(self, port: str, tmp_path: Path) -> str:
         path = tmp_path / 'adapter.yaml'
-        path.write_text(PARAMETERS.replace('virtual, channel: x}', f'slcan, channel: {port}}}'))
+        path.write_text(PARAMETERS.replace(
+            'virtual\n        channel: x\n', f'slcan\n        channel: {port}\n'))
         return str(path)
 
     def test_of_a_bridge_is_left_alone(self, capsys: pytest.CaptureFixture[str], port: str,

@@ -7,12 +7,12 @@ from typing import Any
 
 from parameter_files import bridge_file
 from processes import Client, Processes
+import plant
 from slcan_peer import Answers, Peer
 from waiting import wait_for
 
 PUMP: dict[str, Any] = {
-    'bus': 'main', 'protocol': 'canopen_pkw', 'station': 5, 'profile': 'tesys_t_ltmr',
-    'period': 0.1,
+    **plant.PUMP,
     'cyclic_response': ['system_status_1', 'system_status_2', 'thermal_capacity',
                         'average_current_ratio', 'average_current'],
     # generous: nothing here may depend on how busy the machine is

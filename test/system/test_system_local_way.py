@@ -14,7 +14,7 @@ import threading
 import time
 from typing import Any
 
-from parameter_files import bridge_file
+from parameter_files import bridge_file, LIFT
 from processes import command_line, environment, Processes
 import pytest
 from waiting import DEADLINE
@@ -27,12 +27,6 @@ from drive_can_bridge.process.presence import bridges, SWITCH
 INSIDE = 'DRIVE_CAN_TEST_OWN_NETWORK'
 pytestmark = pytest.mark.real
 inside = pytest.mark.skipif(INSIDE not in os.environ, reason='runs in a network of its own')
-LIFT: dict[str, Any] = {
-    'bus': 'main', 'protocol': 'datamodel_extended', 'station': 2,
-    'profile': 'datamodel_control_example', 'period': 0.02,
-    'cyclic_request': ['control_word', 'speed_setpoint'],
-    'cyclic_response': ['status_word', 'actual_speed'],
-    'missed_limit': 100, 'parameter_timeout': 10.0, 'control_timeout': 20.0}
 
 
 @pytest.mark.skipif(INSIDE in os.environ, reason='is there')

@@ -8,6 +8,7 @@ import signal
 from typing import Any
 
 from parameter_files import bridge_file, CONVEYOR
+import plant
 from processes import Client, Process, Processes
 import pytest
 from waiting import wait_for
@@ -16,19 +17,9 @@ from drive_can_bridge.transport.bus_identity import DeviceLock
 
 #: nothing here may depend on how busy the machine is
 PATIENT: dict[str, Any] = {'missed_limit': 100, 'parameter_timeout': 10.0}
-LIFT: dict[str, Any] = {
-    'bus': 'main', 'protocol': 'datamodel_standard', 'station': 2,
-    'profile': 'datamodel_control_example', 'period': 0.1,
-    'cyclic_request': ['control_word', 'speed_setpoint'],
-    'cyclic_response': ['status_word', 'actual_speed'], **PATIENT}
-MIXER: dict[str, Any] = {
-    'bus': 'main', 'protocol': 'cannord', 'station': 50, 'profile': 'nord_sk500e',
-    'cyclic_request': ['frequency_setpoint'], 'cyclic_response': ['actual_frequency'],
-    **PATIENT}
-PUMP: dict[str, Any] = {
-    'bus': 'main', 'protocol': 'canopen_pkw', 'station': 5, 'profile': 'tesys_t_ltmr',
-    'cyclic_response': ['system_status_1'], 'period': 0.2, **PATIENT}
-ALL = {'conveyor': {**CONVEYOR, **PATIENT}, 'lift': LIFT, 'mixer': MIXER, 'pump': PUMP}
+ALL = {'conveyor': {**CONVEYOR, **PATIENT}, 'mixer': {**plant.MIXER, **PATIENT},
+       'lift': {**plant.LIFT, 'protocol': 'datamodel_standard', 'period': 0.1, **PATIENT},
+       'pump': {**plant.PUMP, **PATIENT, 'period': 0.2}}
 #: what each family is told, and how the value is then written
 WRITES = {'conveyor': ('ramp_time', '2.5'), 'lift': ('ramp_time', '1.5'),
           'mixer': ('acceleration_time', '4'), 'pump': ('motor_trip_class', '10')}

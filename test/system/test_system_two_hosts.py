@@ -4,9 +4,8 @@
 from pathlib import Path
 import signal
 import subprocess
-from typing import Any
 
-from parameter_files import bridge_file
+from parameter_files import bridge_file, LIFT
 from processes import command_line, environment, Process, Processes, Simulator
 import pytest
 from two_hosts import Host, two_hosts
@@ -15,12 +14,6 @@ from waiting import DEADLINE, wait_for
 from drive_can_bridge.process.presence import SWITCH
 
 pytestmark = pytest.mark.real
-LIFT: dict[str, Any] = {
-    'bus': 'main', 'protocol': 'datamodel_extended', 'station': 2,
-    'profile': 'datamodel_control_example', 'period': 0.02,
-    'cyclic_request': ['control_word', 'speed_setpoint'],
-    'cyclic_response': ['status_word', 'actual_speed'],
-    'missed_limit': 100, 'parameter_timeout': 10.0, 'control_timeout': 20.0}
 #: cyclic requests with a control word: that runs, that does not
 RUN, REST = '005FFFF0#0001', '005FFFF0#0000'
 
