@@ -565,7 +565,24 @@ class _Info(ServiceInfo):
     """One that nobody takes for the structure of C."""
 
 
-class Service(Entity):
+class _ServiceEnd(Entity):
+    """Has a queue of requests or responses."""
+
+    def __init__(self, node: Node, kind: Any, name: str, quality: Any) -> None:
+        super().__init__(node, kind, name, quality)
+        self._queue: deque[tuple[bytes, RequestId]] = deque(maxlen=int(self.quality['depth']))
+
+    def receive(self, data: bytes, request: RequestId) -> None:
+        """Take a request or response."""
+        self._queue.append((data, request))
+        self.ring()
+
+    def ready(self) -> bool:
+        """Tell whether something waits."""
+        return bool(self._queue)
+
+
+class Service(_ServiceEnd):
     """See ``rcl_service_t``."""
 
     where = 'services'
@@ -575,16 +592,6 @@ class Service(Entity):
         super().__init__(node, kind, name, quality)
         self.name = self.full_name
         self.qos = self.quality
-        self._queue: deque[tuple[bytes, RequestId]] = deque(maxlen=int(self.quality['depth']))
-
-    def receive(self, data: bytes, request: RequestId) -> None:
-        """Take a request."""
-        self._queue.append((data, request))
-        self.ring()
-
-    def ready(self) -> bool:
-        """Tell whether something waits."""
-        return bool(self._queue)
 
     def service_take_request(self, kind: Any) -> tuple[Any, Any]:
         """Take the oldest request that waits."""
@@ -632,7 +639,7 @@ class _Response(NamedTuple):
     caller: bytes
 
 
-class Client(Entity):
+class Client(_ServiceEnd):
     """See ``rcl_client_t``."""
 
     where = 'clients'
@@ -641,16 +648,6 @@ class Client(Entity):
         super().__init__(node, kind, name, quality)
         self.service_name = self.full_name
         self._number = itertools.count(1)
-        self._queue: deque[tuple[bytes, RequestId]] = deque(maxlen=int(self.quality['depth']))
-
-    def receive(self, data: bytes, request: RequestId) -> None:
-        """Take a response."""
-        self._queue.append((data, request))
-        self.ring()
-
-    def ready(self) -> bool:
-        """Tell whether something waits."""
-        return bool(self._queue)
 
     def send_request(self, request: Any) -> int:
         """Ask all who offer it; return the number of the question."""

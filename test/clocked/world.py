@@ -61,6 +61,15 @@ class World:
                           *(f'{at - BEGIN:9.4f} {text}' for at, text in self._story[-SHOWN:])])
 
 
+def bench_of(request: Any, *, ros: bool = True) -> Iterator[World | None]:
+    """Put a test on the bench, unless it has the mark ``real``: that one has None."""
+    if request.node.get_closest_marker('real') is not None:
+        yield None
+    else:
+        with world(int(os.environ['DRIVE_CAN_TEST_SEED']), ros=ros) as made:
+            yield made
+
+
 @contextmanager
 def world(seed: int, *, ros: bool = False) -> Iterator[World]:
     """Make a world; ``ros``: with a graph."""

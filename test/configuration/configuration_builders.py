@@ -17,7 +17,7 @@ from drive_can_bridge.protocols.families import FAMILIES
 PROTOCOLS = f'{", ".join(list(FAMILIES)[:-1])} or {list(FAMILIES)[-1]}'
 
 #: a good file; tests change a line of it. The line numbers in tests count from here.
-FILE = """\
+HEAD = """\
 /**/drive_can_bridge:
   ros__parameters:
     autostart: true
@@ -27,6 +27,8 @@ FILE = """\
         channel: demo
         bitrate: 125000
     drives:
+"""
+FILE = HEAD + """\
       conveyor:
         bus: main
         protocol: datamodel_extended

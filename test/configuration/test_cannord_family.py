@@ -3,7 +3,7 @@
 
 from pathlib import Path
 
-from configuration_builders import at, changed, load, problems, warnings
+from configuration_builders import at, changed, HEAD, load, problems, warnings
 import pytest
 
 from drive_can_bridge.cli.main import main
@@ -19,16 +19,7 @@ MAPPED = ', '.join(name for name, family in FAMILIES.items()
                    if 'mapping' in family.options_schema)
 
 #: the line numbers in tests count from here
-FILE = """\
-/**/drive_can_bridge:
-  ros__parameters:
-    autostart: true
-    buses:
-      main:
-        interface: virtual
-        channel: demo
-        bitrate: 125000
-    drives:
+FILE = HEAD + """\
       lift:
         bus: main
         protocol: cannord

@@ -4,7 +4,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from configuration_builders import at, changed, load, problems, warnings
+from configuration_builders import at, changed, HEAD, load, problems, warnings
 import pytest
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -15,16 +15,7 @@ FAMILY = CanopenPkw()
 #: how two uses of an identifier are told
 ONE = 'one identifier'
 
-FILE = """\
-/**/drive_can_bridge:
-  ros__parameters:
-    autostart: true
-    buses:
-      main:
-        interface: virtual
-        channel: demo
-        bitrate: 250000
-    drives:
+FILE = HEAD.replace('125000', '250000') + """\
       pump:
         bus: main
         protocol: canopen_pkw

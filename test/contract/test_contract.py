@@ -154,21 +154,15 @@ def test_bus_down_is_silence_at_once(partner: Partner) -> None:
 # -- whatever was told to run is told to stop -----------------------------------------------------
 
 
-def test_stop_right_after_a_stall(partner: Partner) -> None:
+@pytest.mark.parametrize('upset', ['stall', 'bus'])
+def test_stop_right_after_an_upset(partner: Partner, upset: str) -> None:
     run(partner)
+    if upset == 'bus':
+        partner.talk.bus_down(partner.now)
+        assert worries(partner)
     partner.now += 1.5
-    partner.deliver(partner.talk.handle_stall(partner.now))
-    partner.ends(1.0)
-    assert partner.registers[50] == 0
-    assert not worries(partner)
-
-
-def test_stop_right_after_the_bus_came_back(partner: Partner) -> None:
-    run(partner)
-    partner.talk.bus_down(partner.now)
-    assert worries(partner)
-    partner.now += 1.5
-    partner.deliver(partner.talk.bus_up(partner.now))
+    back = partner.talk.bus_up if upset == 'bus' else partner.talk.handle_stall
+    partner.deliver(back(partner.now))
     partner.ends(1.0)
     assert partner.registers[50] == 0
     assert not worries(partner)

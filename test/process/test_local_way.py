@@ -377,7 +377,8 @@ def test_a_bridge_of_a_stranger_is_not_believed(
     host.close()
 
 
-def test_what_nobody_waits_for_any_more_is_not_done_but_a_stop(host: Host) -> None:
+def busy(host: Host) -> tuple[Line, threading.Event]:
+    """Have a host be asked something that takes until the event; return who asked."""
     goes_on = threading.Event()
 
     def wait(asked: LocalRequest) -> None:
@@ -388,6 +389,11 @@ def test_what_nobody_waits_for_any_more_is_not_done_but_a_stop(host: Host) -> No
     first.ask('who')
     while not host.asked:
         time.sleep(0.001)
+    return first, goes_on
+
+
+def test_what_nobody_waits_for_any_more_is_not_done_but_a_stop(host: Host) -> None:
+    first, goes_on = busy(host)
     for action in ('enable', 'stop', 'set'):    # by who loses patience, or is ended
         line = host.call()
         line.ask(action, '/lift')
@@ -399,16 +405,7 @@ def test_what_nobody_waits_for_any_more_is_not_done_but_a_stop(host: Host) -> No
 
 
 def test_ours_are_heard_before_strangers(host: Host) -> None:
-    goes_on = threading.Event()
-
-    def wait(asked: LocalRequest) -> None:
-        goes_on.wait(60.0)
-        host.echo(asked)
-    host.serve = wait
-    first = host.call()
-    first.ask('who')
-    while not host.asked:
-        time.sleep(0.001)
+    first, goes_on = busy(host)
     with stranger():
         strange = [host.call() for _ in range(10)]
     for each in strange:

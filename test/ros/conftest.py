@@ -9,12 +9,11 @@ Whatever a test starts is stopped after it, and has to be gone then: threads, bu
 
 from collections.abc import Iterator
 import importlib.util
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from world import World, world
+from world import bench_of, World
 
 MISSING = importlib.util.find_spec('rclpy') is None
 if TYPE_CHECKING or not MISSING:
@@ -47,11 +46,7 @@ def _real_context() -> Iterator['ClientContext']:
 @pytest.fixture
 def bench(request: pytest.FixtureRequest) -> Iterator[World | None]:
     """Put a test on the bench, unless it has the mark ``real``: that one has None."""
-    if request.node.get_closest_marker('real') is not None:
-        yield None
-        return
-    with world(int(os.environ['DRIVE_CAN_TEST_SEED']), ros=True) as made:
-        yield made
+    yield from bench_of(request)
 
 
 @pytest.fixture

@@ -63,6 +63,14 @@ class TestStates:
         assert made.violations == {RULES['reserved bit']: 1}
 
 
+def at_speed() -> SimulatedCannordInverter:
+    """Return one that runs at its full setpoint."""
+    made = inverter()
+    run(made)
+    tells(made, '7F040040', 0.0)
+    return made
+
+
 class TestMotor:
 
     def test_ramp_to_the_setpoint(self) -> None:
@@ -76,17 +84,13 @@ class TestMotor:
         assert made.value('actual_relative_frequency') == 50.0
 
     def test_shutdown_ramps_down_before_it_disables(self) -> None:
-        made = inverter()
-        run(made)
-        tells(made, '7F040040', 0.0)
+        made = at_speed()
         assert tells(made, '7E040040', 2.0) == '370B0040'
         assert tells(made, '7E040040', 2.5) == '370A0020'
         assert tells(made, '7E040040', 3.0) == '310B0000'
 
     def test_quick_stop_brakes_fast_and_disables(self) -> None:
-        made = inverter()
-        run(made)
-        tells(made, '7F040040', 0.0)
+        made = at_speed()
         tells(made, '7A040040', 2.0)
         assert tells(made, '7A040040', 2.1) == '170A0020'       # 0.2 s from 100 %
         # run again during the stop does not end it
@@ -95,9 +99,7 @@ class TestMotor:
         assert tells(made, '7F040040', 9.0) == '700B0000'
 
     def test_voltage_off_coasts(self) -> None:
-        made = inverter()
-        run(made)
-        tells(made, '7F040040', 0.0)
+        made = at_speed()
         tells(made, '7C040040', 2.0)
         assert tells(made, '7C040040', 3.0) == '600A0030'       # 4 s from 100 %
 
@@ -111,9 +113,7 @@ class TestMotor:
         assert tells(made, '7F1400E0', 9.0) == '370B0020'
 
     def test_ramp_generator_bits(self) -> None:
-        made = inverter()
-        run(made)
-        tells(made, '7F040040', 0.0)
+        made = at_speed()
         tells(made, '5F040040', 0.5)                            # frozen at 50 %
         assert tells(made, '5F040040', 2.0)[4:] == '0020'
         tells(made, '3F040040', 2.0)                            # setpoint 0: normal ramp
@@ -195,9 +195,7 @@ class TestBroadcast:
 class TestFaults:
 
     def test_fault_is_told_unasked(self) -> None:
-        made = inverter()
-        run(made)
-        tells(made, '7F040040', 0.0)
+        made = at_speed()
         made.fault('trip', 5.0)
         assert [str(sent) for sent in made.take_frames()] == ['0C9#380A0040']
         assert tells(made, RUN, 5.0) == '380A0040'

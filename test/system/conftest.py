@@ -19,7 +19,7 @@ from processes import Client, ClientProcess, Processes
 import pytest
 from slcan_peer import Answers, Peer
 from waiting import DEADLINE
-from world import World, world
+from world import bench_of, World
 
 if TYPE_CHECKING:
     from on_bench import BenchPeer, BenchProcesses
@@ -48,11 +48,7 @@ def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Iterator[None]:
 @pytest.fixture(name='world')
 def _world(request: pytest.FixtureRequest) -> Iterator[World | None]:
     """Return the bench; None: the story is real."""
-    if request.node.get_closest_marker('real') is not None:
-        yield None
-        return
-    with world(int(os.environ['DRIVE_CAN_TEST_SEED']), ros=True) as made:
-        yield made
+    yield from bench_of(request)
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Processes
-from test_system_reconnection import rearm_and_move, start_moving, status_of
+from test_system_reconnection import moving, rearm_and_move, status_of
 from waiting import SLOWNESS, wait_for
 
 PERIOD = 0.1 * SLOWNESS
@@ -21,10 +21,7 @@ def test_drive_that_still_works(processes: Processes, client: Client, namespace:
                                 tmp_path: Path) -> None:
     # it stays online, its values stay true, it goes on as it is told; what is odd is reported
     file = bridge_file(tmp_path, drives={'conveyor': {**CONVEYOR, 'period': PERIOD}})
-    simulator = processes.simulator(file)
-    bridge = processes.bridge(file, namespace)
-    drive = f'/{namespace}/conveyor'
-    start_moving(client, drive)
+    simulator, bridge, drive = moving(processes, client, namespace, file)
     for fault, words in STILL_WORKS.items():
         client.publish(f'{drive}/command/speed_setpoint', 150.0)
         client.value(f'{drive}/actual_speed', 145.0, 155.0)
@@ -60,10 +57,7 @@ def test_drive_that_is_lost(processes: Processes, client: Client, namespace: str
                             tmp_path: Path) -> None:
     file = bridge_file(tmp_path, drives={'conveyor': {
         **CONVEYOR, 'period': PERIOD, 'missed_limit': 4, 'mapping': 'configure'}})
-    simulator = processes.simulator(file)
-    bridge = processes.bridge(file, namespace)
-    drive = f'/{namespace}/conveyor'
-    start_moving(client, drive)
+    simulator, bridge, drive = moving(processes, client, namespace, file)
     for fault, reason in LOST.items():
         told = len(bridge.errors)
         simulator.write(f'conveyor {fault}')

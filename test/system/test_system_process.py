@@ -12,7 +12,7 @@ import tty
 from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Process, Processes
 import pytest
-from test_system_reconnection import rearm_and_move, start_moving
+from test_system_reconnection import moving, rearm_and_move
 from waiting import clock, pause, wait_for, wait_for_end
 
 DEACTIVATE = 4
@@ -69,9 +69,7 @@ def test_signal_while_deactivating(processes: Processes, client: Client, namespa
                                    tmp_path: Path, delay: float) -> None:
     # three neutral cycles of 0.1 s; whatever is under way when the signal comes
     file = bridge_file(tmp_path, drives={'conveyor': {**CONVEYOR, 'period': 0.2}})
-    simulator = processes.simulator(file)
-    bridge = processes.bridge(file, namespace)
-    start_moving(client, f'/{namespace}/conveyor')
+    simulator, bridge, _ = moving(processes, client, namespace, file)
     def send() -> None:
         pause(delay)
         bridge.send(signal.SIGTERM)
@@ -93,10 +91,7 @@ def test_signal_while_deactivating(processes: Processes, client: Client, namespa
 def test_out_of_file_descriptors(processes: Processes, client: Client, namespace: str,
                                  tmp_path: Path) -> None:
     file = bridge_file(tmp_path)
-    simulator = processes.simulator(file)
-    bridge = processes.bridge(file, namespace)
-    drive = f'/{namespace}/conveyor'
-    start_moving(client, drive)
+    simulator, bridge, drive = moving(processes, client, namespace, file)
     # no further file can be opened, whatever is closed
     before = resource.prlimit(bridge.pid, resource.RLIMIT_NOFILE)
     resource.prlimit(bridge.pid, resource.RLIMIT_NOFILE, (3, before[1]))

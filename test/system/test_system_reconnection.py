@@ -43,6 +43,23 @@ def start_moving(client: Client, drive: str) -> None:
     move(client, drive)
 
 
+def moving(processes: Processes, client: Client, namespace: str, file: Path,
+           ) -> tuple[Simulator, Process, str]:
+    """Return a simulator, a bridge, and the conveyor, which moves."""
+    simulator, bridge = processes.simulator(file), processes.bridge(file, namespace)
+    start_moving(client, f'/{namespace}/conveyor')
+    return simulator, bridge, f'/{namespace}/conveyor'
+
+
+def goes_on(client: Client, drive: str, bridge: Process, simulator: Simulator) -> None:
+    """See that a drive moves on, and its bridge takes no notice of others."""
+    count = len(simulator.frames())
+    assert set(simulator.frame('^003FFFF0#.* R$', count, 5)) == {'003FFFF0#05DC03E800000000 R'}
+    assert client.get(drive, 'ramp_time') == [1.0]
+    assert not bridge.losses()
+    assert client.diagnostics(status_of(drive))['frames_rejected'] == '0'
+
+
 def rearm_and_move(client: Client, drive: str, bridge: Process, simulator: Simulator,
                    since: int = 0) -> None:
     """
@@ -63,10 +80,7 @@ def rearm_and_move(client: Client, drive: str, bridge: Process, simulator: Simul
 def test_simulator_is_killed_and_restarted(processes: Processes, client: Client, namespace: str,
                                            tmp_path: Path) -> None:
     file = bridge_file(tmp_path)
-    simulator = processes.simulator(file)
-    bridge = processes.bridge(file, namespace)
-    drive = f'/{namespace}/conveyor'
-    start_moving(client, drive)
+    simulator, bridge, drive = moving(processes, client, namespace, file)
     simulator.kill()
     client.online(drive, wanted=False)
     bridge.error('conveyor: offline: bus main is down$')
@@ -98,10 +112,7 @@ def test_drive_falls_silent_and_comes_back(processes: Processes, client: Client,
     file = bridge_file(tmp_path,
                        drives={'conveyor': {**CONVEYOR, 'period': 0.1,
                                               'missed_limit': MISSED_LIMIT}})
-    simulator = processes.simulator(file)
-    bridge = processes.bridge(file, namespace)
-    drive = f'/{namespace}/conveyor'
-    start_moving(client, drive)
+    simulator, bridge, drive = moving(processes, client, namespace, file)
     simulator.write('conveyor silent')
     client.online(drive, wanted=False)
     bridge.error('conveyor: offline: no cyclic response for 4 cycles')

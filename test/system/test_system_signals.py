@@ -8,7 +8,7 @@ from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Process, Processes
 import pytest
 from test_system_datamodel_standard import SHORT
-from test_system_reconnection import NEUTRAL, rearm_and_move, start_moving
+from test_system_reconnection import moving, NEUTRAL, rearm_and_move, start_moving
 from waiting import wait_for, wait_for_end
 from world import World
 
@@ -24,9 +24,7 @@ def looks_after_signals(process: Process) -> bool:
 def test_while_active(processes: Processes, client: Client, namespace: str, tmp_path: Path,
                       ) -> None:
     file = bridge_file(tmp_path)
-    simulator = processes.simulator(file)
-    bridge = processes.bridge(file, namespace)
-    start_moving(client, f'/{namespace}/conveyor')
+    simulator, bridge, _ = moving(processes, client, namespace, file)
     bridge.send(signal.SIGTSTP)     # Ctrl-Z would leave it running
     bridge.error('drive_can_bridge: Ctrl-Z refused: ')
     assert bridge.end(signal.SIGTERM) == 0
@@ -51,9 +49,7 @@ def test_whichever_it_is_what_moves_is_stopped(processes: Processes, client: Cli
                                                namespace: str, tmp_path: Path,
                                                numbers: list[int], code: int) -> None:
     file = bridge_file(tmp_path)
-    simulator = processes.simulator(file)
-    bridge = processes.bridge(file, namespace)
-    start_moving(client, f'/{namespace}/conveyor')
+    simulator, bridge, _ = moving(processes, client, namespace, file)
     for number in numbers:
         bridge.send(number)
     assert bridge.wait() == code
@@ -65,9 +61,7 @@ def test_whichever_it_is_what_moves_is_stopped(processes: Processes, client: Cli
 def test_drive_that_falls_silent_together_with_the_end(
         processes: Processes, client: Client, namespace: str, tmp_path: Path) -> None:
     file = bridge_file(tmp_path)
-    simulator = processes.simulator(file)
-    bridge = processes.bridge(file, namespace)
-    start_moving(client, f'/{namespace}/conveyor')
+    simulator, bridge, _ = moving(processes, client, namespace, file)
     simulator.write('conveyor silent')
     assert bridge.end() == 0
     bridge.error('conveyor: told to stop, but it does not answer: it may still be running')
@@ -136,9 +130,7 @@ def test_drives_that_a_second_signal_leaves_unstopped_are_named(
         processes: Processes, client: Client, namespace: str, tmp_path: Path) -> None:
     """It has to be told by writes that nobody confirms, which takes longer than the grace."""
     file = bridge_file(tmp_path, drives={'conveyor': SHORT})
-    simulator = processes.simulator(file)
-    bridge = processes.bridge(file, namespace)
-    start_moving(client, f'/{namespace}/conveyor')
+    simulator, bridge, _ = moving(processes, client, namespace, file)
     simulator.suspend()
     try:
         bridge.send(signal.SIGINT)
@@ -156,10 +148,7 @@ def test_process_that_stood_still(processes: Processes, client: Client, namespac
                                   tmp_path: Path) -> None:
     # a command would still be fresh: only the lost time may stop it
     file = bridge_file(tmp_path, drives={'conveyor': {**CONVEYOR, 'command_timeout': 60.0}})
-    simulator = processes.simulator(file)
-    bridge = processes.bridge(file, namespace)
-    drive = f'/{namespace}/conveyor'
-    start_moving(client, drive)
+    simulator, bridge, drive = moving(processes, client, namespace, file)
     bridge.suspend()
     client.ask('rest', seconds=0.3)     # what was on its way when it stopped arrives
     simulator.write('list')
@@ -211,9 +200,7 @@ def test_what_was_sent_while_it_stood_still_is_thrown_away(
 @pytest.mark.real
 def test_killed(processes: Processes, client: Client, namespace: str, tmp_path: Path) -> None:
     file = bridge_file(tmp_path)
-    simulator = processes.simulator(file)
-    bridge = processes.bridge(file, namespace)
-    start_moving(client, f'/{namespace}/conveyor')
+    simulator, bridge, _ = moving(processes, client, namespace, file)
     assert bridge.end(signal.SIGKILL) == -signal.SIGKILL
     # nothing is left behind that goes on feeding the drive, or keeps the adapter busy
     simulator.write('list')

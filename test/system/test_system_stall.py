@@ -24,6 +24,14 @@ def peer(connect: Callable[[Answers], Peer]) -> Peer:
         CYCLIC_REQUEST: f'T103FFFF08{ZEROS}', f'T002001E18{ZEROS}': f'T102001E180064{ZEROS[4:]}'})
 
 
+def told_to_move(client: Client, namespace: str, peer: Peer, since: int = 0) -> None:
+    topic = f'/{namespace}/conveyor/command/speed_setpoint'
+    client.publish(topic, 0.0)
+    client.diagnostics(f'{namespace}/drive_can_bridge: drive conveyor', state='^online$')
+    client.publish(topic, 150.0)
+    peer.wait_for(f'{CYCLIC_REQUEST}05DC', since)
+
+
 def test_adapter_that_takes_nothing(processes: Processes, client: Client, namespace: str,
                                     tmp_path: Path, peer: Peer) -> None:
     # the drive's maps are not looked at, so that it is fed even while it is offline: the kernel's
@@ -34,11 +42,7 @@ def test_adapter_that_takes_nothing(processes: Processes, client: Client, namesp
     drive = f'/{namespace}/conveyor'
     bus = f'{namespace}/drive_can_bridge: bus main'
     client.online(drive)
-    client.publish(f'{drive}/command/speed_setpoint', 0.0)
-    client.diagnostics(f'{namespace}/drive_can_bridge: drive conveyor',
-                       state='^online$')
-    client.publish(f'{drive}/command/speed_setpoint', 150.0)
-    peer.wait_for(f'{CYCLIC_REQUEST}05DC')
+    told_to_move(client, namespace, peer)
 
     peer.stop_reading()
     client.online(drive, wanted=False)
@@ -72,11 +76,7 @@ def test_adapter_that_takes_nothing(processes: Processes, client: Client, namesp
     assert old[-4:].count('C') >= 1
     assert not [line for line in old if line.endswith('C') and len(line) > 1]
     assert client.get(drive, 'ramp_time') == [1.0]
-    client.publish(f'{drive}/command/speed_setpoint', 0.0)
-    client.diagnostics(f'{namespace}/drive_can_bridge: drive conveyor',
-                       state='^online$')
-    client.publish(f'{drive}/command/speed_setpoint', 150.0)
-    peer.wait_for(f'{CYCLIC_REQUEST}05DC', count)
+    told_to_move(client, namespace, peer, count)
     assert bridge.end() == 0
     wait_for_end(lambda: [line for line in peer.lines if line.startswith('T')],
                  [CYCLIC_REQUEST + NEUTRAL_WORDS] * 3)
@@ -92,11 +92,7 @@ def test_stop_of_a_drive_that_moves_while_the_adapter_takes_nothing(
     bridge = processes.bridge(file, namespace)
     drive = f'/{namespace}/conveyor'
     client.online(drive)
-    client.publish(f'{drive}/command/speed_setpoint', 0.0)
-    client.diagnostics(f'{namespace}/drive_can_bridge: drive conveyor',
-                       state='^online$')
-    client.publish(f'{drive}/command/speed_setpoint', 150.0)
-    peer.wait_for(f'{CYCLIC_REQUEST}05DC')
+    told_to_move(client, namespace, peer)
     peer.stop_reading()
     bridge.error('the adapter takes no more data')
     assert bridge.end() == 0

@@ -197,23 +197,29 @@ def heard_as(name: str) -> Frame:
     return FRAME._replace(extended=True) if name == 'serial' and SERIAL_ALL_EXTENDED else FRAME
 
 
-@pytest.mark.parametrize('name', [name for name in LINES if name != 'socketcand' and not (
-    name == 'serial' and SERIAL_ALL_EXTENDED)])
-def test_an_echo_is_told_once_and_dropped(name: str, peer: Callable[..., Peer]) -> None:
-    there = peer(name, echo=True)
-    port = there.opened()
+def echoes(port: Port, wait: float, say: Callable[[int], object] = lambda number: None) -> None:
+    """Send until it is told that what is sent comes back."""
     told: list[str] = []
     port.tell = told.append
     # on a busy machine an echo may come too late to be one, until it is known that they come
     for number in range(400):
         known = bool(told)
         port.send(Frame(0x201, bytes([number & 0xFF]), False), 0.5)
-        end = REAL.now() + 0.04
+        say(number)
+        end = REAL.now() + wait
         while REAL.now() < end:
             assert port.receive(0.005) is None or not known
         if known and number >= 60:
             break
     assert told == [says('adapter_echoes')]
+
+
+@pytest.mark.parametrize('name', [name for name in LINES if name != 'socketcand' and not (
+    name == 'serial' and SERIAL_ALL_EXTENDED)])
+def test_an_echo_is_told_once_and_dropped(name: str, peer: Callable[..., Peer]) -> None:
+    there = peer(name, echo=True)
+    port = there.opened()
+    echoes(port, 0.04)
     there.say(LINES[name].whole)
     assert received(port) == FRAME
     port.close()
@@ -222,16 +228,6 @@ def test_an_echo_is_told_once_and_dropped(name: str, peer: Callable[..., Peer]) 
 def test_an_echo_of_a_gateway(peer: Callable[..., Peer]) -> None:
     there = peer('socketcand')
     port = there.opened()
-    told: list[str] = []
-    port.tell = told.append
-    for number in range(400):
-        known = bool(told)
-        port.send(Frame(0x201, bytes([number & 0xFF]), False), 0.5)
-        there.say(f'< frame 201 1700000000.500000 {number & 0xFF:02X} >'.encode())
-        end = REAL.now() + 0.01
-        while REAL.now() < end:
-            assert port.receive(0.005) is None or not known
-        if known and number >= 60:
-            break
-    assert told == [says('adapter_echoes')]
+    echoes(port, 0.01, lambda number: there.say(
+        f'< frame 201 1700000000.500000 {number & 0xFF:02X} >'.encode()))
     port.close()
