@@ -191,7 +191,7 @@ backups_of_two_profiles = Text(
     '({profiles}), and neither is here: values are compared without units',
     do='compare backups of the same kind of drive, made with the same profile')
 no_settings_left_out = Text(
-    '{word}: left out, because no settings: {count} values ({names}{more})',
+    '{word}: left out, because no settings: {count:#value} ({names}{more})',
     do='nothing: they are values that only show something')
 restore_while_enabled = Text(
     '{drive}: is enabled: settings are not written while it may move. Disable it first. '
@@ -274,7 +274,7 @@ suffix_loses = Text(
     'warning: {suffix} does not keep {loss}; .log does',
     do='choose .log to keep it')
 record_lost = Text(
-    'bus {bus}: {lost} frames lost: this machine is too slow for the traffic',
+    'bus {bus}: {lost:#frame} lost: this machine is too slow for the traffic',
     do='see what else the computer does')
 only_listening = Text(
     'there is another master ({master}): only listening',
@@ -304,7 +304,7 @@ nothing_heard = Text(
     do='leave --passive away where no other master is on the bus')
 error_frames_seen = Text('{count} error frames{told}', do='check cable, termination and bit rate')
 no_drive_found = Text(
-    'no drive found, {frames} frames heard',
+    'no drive found, {frames:#frame} heard',
     do='see what it says of the bus; --protocols for drives with 11-bit identifiers')
 online_unknown = Text(
     '{said}; nobody says whether it is online',
@@ -370,7 +370,7 @@ recording_ended = Text(
     'the recording has ended',
     do='activate the bridge: it records while it is active')
 trace_written = Text(
-    'bus {bus}: trace of {reason}, {count} frames of the last {seconds:g} s: {path}',
+    'bus {bus}: trace of {reason}, {count:#frame} of the last {seconds:g} s: {path}',
     do='read it: drive_can decode FILE')
 trace_without_frames = Text(
     'bus {bus}: not a single frame in the last {seconds:g} s',

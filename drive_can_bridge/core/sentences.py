@@ -330,7 +330,7 @@ enable_withdrawn = Text(
     'enable withdrawn: {reason}; only ~/enable starts {whom} again',
     do='enable the drive when it is there again')
 status_missing = Text(
-    '{answers} answers without a status word',
+    '{answers:#answer} without a status word',
     do='see why the answers of the drive are short')
 disregards = Text(
     'does not obey {action} ({word:04X}h): stop it by other means; still {state} ({status}); '
@@ -380,7 +380,7 @@ no_answer_for_map = Text(
 write_unanswered = Text('{what}: no answer', do='see why the drive does not answer')
 write_not_taken = Text('{what} not taken by the bus', do='look at cable, termination and bit rate')
 write_not_acknowledged = Text(
-    '{what} not acknowledged in {attempts} attempts',
+    '{what} not acknowledged in {attempts:#attempt}',
     do='look at power, cable and station of the drive; see its diagnostics')
 node_may_be_stopped = Text(
     'a node that NMT has stopped answers no SDO: only an NMT command (pre-operational, start) of '
@@ -773,7 +773,7 @@ nothing_recorded = Text(
     'nothing is recorded: set trace_seconds of a bus',
     do='set trace_seconds of a bus')
 log_too_fast = Text(
-    '{lines} lines of the log left out: they came faster than they could be written',
+    '{lines:#line} of the log left out: they came faster than they could be written',
     do='see what floods the log, or what takes it so slowly')
 
 # -- diagnostics: how a bus is --------------------------------------------------------------------
@@ -785,7 +785,7 @@ frames_overflowed = Text(
     'does',
     do='see what else the computer does')
 frames_not_sent = Text(
-    '{frames} frames not sent: {why}',
+    '{frames:#frame} not sent: {why}',
     do='look at cable, termination and bit rate')
 adapter_keeps = Text(
     '{adapter} keeps what it has received for up to {latency} ms, and the shortest period is '
@@ -870,7 +870,7 @@ one_master_only = Text(
     '{seen}: there must be one master only',
     do='end the other master: a drive obeys the last one that wrote')
 frames_rejected = Text(
-    '{frames} frames rejected, the last: {last}; check for a second station with the same number',
+    '{frames:#frame} rejected, the last: {last}; check for a second station with the same number',
     do='check for a second station with the same number')
 answer_late = Text(
     'answer {seconds} ms after its period: the computer, the adapter or the drive is too slow',
@@ -983,7 +983,7 @@ stop_frames_not_sent = Text(
     'bus {bus}: the stop frames could not all be sent: {reason}',
     do='make sure that its drives stand still, by other means if need be')
 commands_discarded = Text(
-    '{count} commands thrown away: {why}',
+    '{count:#command} thrown away: {why}',
     do='see what held the bridge up; publish again')
 asked_on_host = Text(
     '{action}, asked by {whom}', '{action}, asked on this host',
