@@ -8,8 +8,8 @@ Whatever it raises, :mod:`.main` prints in one line.
 
 import argparse
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 import math
 import os
 from pathlib import Path
@@ -23,6 +23,7 @@ from drive_can_bridge.cli.saying import (
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.text import is_ros_name, printable
+from drive_can_bridge.resources import what_is_missing
 
 if TYPE_CHECKING:
     from drive_can_bridge.core.configuration import BridgeConfiguration
@@ -42,6 +43,19 @@ _EXAMPLES = {'--fault': 'DRIVE:FAULT, for example conveyor:late=0.15',
 
 class WrongUsage(DriveCanError):
     """The command line cannot be used, nothing was sent or written: exit code 2."""
+
+
+@contextmanager
+def imports_of(command: str) -> Iterator[None]:
+    """
+    Import what a command needs, ROS above all.
+
+    :raises DriveCanError: it is missing; with what to install.
+    """
+    try:
+        yield
+    except ImportError as error:
+        raise DriveCanError(what_is_missing(command, error)) from error
 
 
 class Parser(argparse.ArgumentParser):

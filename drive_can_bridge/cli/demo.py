@@ -20,7 +20,7 @@ import tempfile
 import termios
 from threading import Event
 
-from drive_can_bridge.cli.command import above_zero, of_drive, whole, WrongUsage
+from drive_can_bridge.cli.command import above_zero, imports_of, of_drive, whole, WrongUsage
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BridgeConfiguration
@@ -28,8 +28,9 @@ from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.text import counted
 from drive_can_bridge.demo.child import Child
 from drive_can_bridge.process import environment
+from drive_can_bridge.process.critical_sections import handled
 from drive_can_bridge.process.signals import NOT_SUSPENDED, SignalWatcher
-from drive_can_bridge.resources import config_file, what_is_missing
+from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.faults import parse_fault, usage_lines
 from drive_can_bridge.simulation.simulation import Simulation
 
@@ -94,11 +95,8 @@ def run(args: argparse.Namespace) -> int:
     suspension = Event()
     with SignalWatcher(args.clock, refuse=suspension.set) as watcher:
         environment.prepare(args.domain_id)
-        try:
-            # what the other processes import: better to know now
+        with imports_of('drive_can demo'):  # by the other processes: better to know now
             from drive_can_bridge.ros.demo import commander  # noqa: F401
-        except ImportError as error:
-            raise DriveCanError(what_is_missing('drive_can demo', error)) from error
         # imported late: it reads schemas, and --help needs none
         from drive_can_bridge.configuration.load import configuration_from_file
         configuration = configuration_from_file(args.params_file or config_file(PARAMETER_FILE))
@@ -183,11 +181,10 @@ class Demo:
         from drive_can_bridge.configuration.load import write_parameter_file
         args, directory = self._args, self._directory
         # the view is in the terminal's foreground, too, and must not be suspended either
-        before = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
         refusal = ['--refuse-to-suspend', NOT_SUSPENDED] if self._live else []
-        self._view = self._start('the view', 'drive_can', 'monitor', '--title', TITLE,
-                                 '--quit-code', str(ENOUGH), *refusal, view=True)
-        signal.signal(signal.SIGTSTP, before)
+        with handled((signal.SIGTSTP,), signal.SIG_IGN):
+            self._view = self._start('the view', 'drive_can', 'monitor', '--title', TITLE,
+                                     '--quit-code', str(ENOUGH), *refusal, view=True)
         file = directory / PARAMETER_FILE
         write_parameter_file(self._configuration, file)
         arguments = ['--params-file', str(file), '--pty-link', str(directory)]

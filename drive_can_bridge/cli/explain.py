@@ -98,7 +98,7 @@ def _is_line(word: str) -> bool:
 def _explain(text: str, *, json: bool) -> int:
     """Show the rows of codes, or those of a text; return the exit code."""
     named, unknown = _named(text), list[str]()
-    rows = named or _told(text)
+    rows = rows_of(text)
     if not rows:    # a list of codes, of which some are none; mostly other words: a text
         words = text.split()
         unknown = [word for word in words if not _rows_of_code(word)]
@@ -125,11 +125,7 @@ def _explain(text: str, *, json: bool) -> int:
 
 def rows_of(text: str) -> list[tuple[str, Text]]:
     """Return the rows of codes, of words of a text, or of a line, and what they are about."""
-    return _named(text) or _told(text)
-
-
-def _told(text: str) -> list[tuple[str, Text]]:
-    return _with_words(text) or _said_in(text)
+    return _named(text) or _with_words(text) or _said_in(text)
 
 
 def _named(text: str) -> list[tuple[str, Text]]:

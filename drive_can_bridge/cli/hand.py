@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any
 
 from drive_can_bridge.cli.command import (
-    add_words_for_a_bridge, complain, only_through_a_bridge, WrongUsage)
+    add_words_for_a_bridge, complain, imports_of, only_through_a_bridge, WrongUsage)
 from drive_can_bridge.cli.stopping import answers, show
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.bridges import chosen_drives, UnknownDrive
@@ -19,7 +19,6 @@ from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 from drive_can_bridge.host_texts import is_pattern
 from drive_can_bridge.process.local_stop import Answer, begun, LocalStop
 from drive_can_bridge.process.local_way import matches
-from drive_can_bridge.resources import what_is_missing
 
 STOP = 'stop'
 _WORDS = {
@@ -106,14 +105,12 @@ def _ros(args: Namespace, join: Callable[[Callable[[], Any]], Any] = lambda make
     :param join: makes the client node.
     :raises DriveCanError: no ROS.
     """
-    try:
+    with imports_of(f'drive_can {args.subcommand}'):
         from drive_can_bridge.ros.client.client_node import ClientNode
         # is being discovered while the rest is imported
         client_node = join(partial(ClientNode, 'client'))
         from drive_can_bridge.ros.client import drive_commands
         from drive_can_bridge.ros.client.graph import Graph
-    except ImportError as error:
-        raise DriveCanError(what_is_missing(f'drive_can {args.subcommand}', error)) from error
     return Graph(args.clock, client_node), drive_commands
 
 

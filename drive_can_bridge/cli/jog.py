@@ -2,23 +2,22 @@
 """``drive_can jog``: hold a setpoint for a while, through the bridge."""
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 import signal
 import sys
 from typing import Any
 
 from drive_can_bridge.cli.command import (
-    above_zero, add_words_for_a_bridge, agreed, complain, FAILED, must_be_answerable,
+    above_zero, add_words_for_a_bridge, agreed, complain, FAILED, imports_of, must_be_answerable,
     only_through_a_bridge, print_json, say, WrongUsage)
 from drive_can_bridge.cli.output import waiting
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.host_texts import is_pattern
-from drive_can_bridge.process.critical_sections import Interruption, postponed
+from drive_can_bridge.process.critical_sections import handled, Interruption, postponed
 from drive_can_bridge.process.signals import NOT_SUSPENDED
-from drive_can_bridge.resources import what_is_missing
 
 #: s: the default, and the longest time
 _SECONDS, _LONGEST = 2.0, 60.0
@@ -63,12 +62,10 @@ def run(args: Namespace) -> int:
     """
     drive, name, value = _understood(args)
     must_be_answerable(yes=args.yes, otherwise='nothing was moved', yes_means=_YES_MEANS)
-    try:
+    with imports_of('drive_can jog'):
         from drive_can_bridge.client.jog import find_target
         from drive_can_bridge.ros.client.client_node import ClientNode
         from drive_can_bridge.ros.client.graph import Graph
-    except ImportError as error:
-        raise DriveCanError(what_is_missing('drive_can jog', error)) from error
     graph = Graph(args.clock, ClientNode('jog'))
     try:
         with waiting('looking for the drive'):
@@ -156,11 +153,6 @@ def _move(args: Namespace, graph: Any, target: Any, label: str) -> int:
 @contextmanager
 def _kept_running() -> Iterator[Interruption]:
     """Record what ends the process; refuse what would suspend it."""
-    def refuse(*_: object) -> None:
-        complain(NOT_SUSPENDED)
-    before: Callable[..., object] | int | None = signal.signal(signal.SIGTSTP, refuse)
-    try:
-        with postponed(lambda: complain('drive_can jog: back to neutral')) as interruption:
-            yield interruption
-    finally:
-        signal.signal(signal.SIGTSTP, before)
+    with (handled((signal.SIGTSTP,), lambda *_: complain(NOT_SUSPENDED)),
+          postponed(lambda: complain('drive_can jog: back to neutral')) as interruption):
+        yield interruption

@@ -12,16 +12,14 @@ import os
 import shutil
 import sys
 
-from drive_can_bridge.cli.command import namespace
+from drive_can_bridge.cli.command import imports_of, namespace
 from drive_can_bridge.clock import Clock
-from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import ModelSource
 from drive_can_bridge.monitor.summary import balance, documents, Lines
 from drive_can_bridge.process import environment
 from drive_can_bridge.process.beginning import leave
 from drive_can_bridge.process.signals import SignalWatcher
-from drive_can_bridge.resources import what_is_missing
 
 #: s between two lines of a drive, and between two looks at what arrives
 LINE_PERIOD = 1.0
@@ -76,10 +74,8 @@ def run(args: argparse.Namespace) -> int:
     # a second signal ends the process at once
     with SignalWatcher(args.clock, keep=True,
                        refuse=refusal.begin if args.refuse_to_suspend else None) as watcher:
-        try:
+        with imports_of('drive_can monitor'):
             from drive_can_bridge.ros.monitor.client import MonitorClient
-        except ImportError as error:
-            raise DriveCanError(what_is_missing('drive_can monitor', error)) from error
         # a demo starts its bridge itself, and ends it
         model = Model(args.namespace, started_here=args.title != _TITLE)
         source = MonitorClient(model)

@@ -10,14 +10,14 @@ from collections.abc import Callable
 import socket
 import sys
 
-from drive_can_bridge.cli.command import namespace, whole
+from drive_can_bridge.cli.command import imports_of, namespace, whole
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.process import environment
 from drive_can_bridge.process.beginning import leave
 from drive_can_bridge.process.signals import SignalWatcher
-from drive_can_bridge.resources import command_that_brings, what_is_missing
+from drive_can_bridge.resources import command_that_brings
 
 COMMAND = 'drive_can panel'
 #: messages per second to be sampled for all drives that are not in focus
@@ -63,11 +63,8 @@ def _module(error: ImportError) -> str:
 
 def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
     """Serve until the end; return whether the addresses were printed before it came."""
-    try:
-        from drive_can_bridge.ros.monitor.client import MonitorClient
-        from drive_can_bridge.ros.monitor.client import ServiceOperations
-    except ImportError as error:
-        raise DriveCanError(what_is_missing(COMMAND, error)) from error
+    with imports_of(COMMAND):
+        from drive_can_bridge.ros.monitor.client import MonitorClient, ServiceOperations
     if ended():     # what follows takes seconds, too
         return False
     try:

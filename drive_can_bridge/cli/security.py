@@ -20,6 +20,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 import ipaddress
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 from drive_can_bridge.cli.command import namespace, output_path, whole
@@ -200,35 +201,21 @@ def transport_profile(args: Namespace, *, listens: bool) -> str:
     """
     root = ElementTree.Element('dds', xmlns=_NAMESPACE)
     profiles = ElementTree.SubElement(root, 'profiles')
-    descriptors = ElementTree.SubElement(profiles, 'transport_descriptors')
-    transport = ElementTree.SubElement(descriptors, 'transport_descriptor')
-    _text(transport, 'transport_id', _TRANSPORT)
-    _text(transport, 'type', 'TCPv4')
-    if listens:
-        ports = ElementTree.SubElement(transport, 'listening_ports')
-        _text(ports, 'port', str(args.port))
-    tls = ElementTree.SubElement(transport, 'tls')
-    for name, file in (('private_key_file', 'key.pem'), ('cert_chain_file', 'cert.pem'),
-                       ('verify_file', 'ca.pem')):
-        _text(tls, name, str(args.certificates / file))
-    modes = ElementTree.SubElement(tls, 'verify_mode')
-    for mode in _VERIFY:
-        _text(modes, 'verify', mode)
-    options = ElementTree.SubElement(tls, 'options')
-    for option in _OPTIONS:
-        _text(options, 'option', option)
+    files = [(name, str(args.certificates / file)) for name, file in (
+        ('private_key_file', 'key.pem'), ('cert_chain_file', 'cert.pem'),
+        ('verify_file', 'ca.pem'))]
+    _fill(profiles, [('transport_descriptors', [('transport_descriptor', [
+        ('transport_id', _TRANSPORT), ('type', 'TCPv4'),
+        *([('listening_ports', [('port', str(args.port))])] if listens else ()),
+        ('tls', [*files, ('verify_mode', [('verify', mode) for mode in _VERIFY]),
+                 ('options', [('option', option) for option in _OPTIONS])])])])])
     participant = ElementTree.SubElement(
         profiles, 'participant', profile_name=_TRANSPORT, is_default_profile='true')
-    rtps = ElementTree.SubElement(participant, 'rtps')
-    _text(ElementTree.SubElement(rtps, 'userTransports'), 'transport_id', _TRANSPORT)
-    _text(rtps, 'useBuiltinTransports', 'false')
-    if not listens:
-        builtin = ElementTree.SubElement(rtps, 'builtin')
-        peers = ElementTree.SubElement(builtin, 'initialPeersList')
-        locator = ElementTree.SubElement(ElementTree.SubElement(peers, 'locator'), 'tcpv4')
-        _text(locator, 'address', args.host)
-        _text(locator, 'physical_port', str(args.port))
-        _text(locator, 'port', '0')
+    peers = [('locator', [('tcpv4', [
+        ('address', args.host), ('physical_port', str(args.port)), ('port', '0')])])]
+    _fill(participant, [('rtps', [
+        ('userTransports', [('transport_id', _TRANSPORT)]), ('useBuiltinTransports', 'false'),
+        *([] if listens else [('builtin', [('initialPeersList', peers)])])])])
     return _document(root)
 
 
@@ -238,8 +225,13 @@ def _document(root: ElementTree.Element) -> str:
             f'{ElementTree.tostring(root, encoding="unicode")}\n')
 
 
-def _text(parent: ElementTree.Element, name: str, text: str) -> None:
-    ElementTree.SubElement(parent, name).text = text
+def _fill(parent: ElementTree.Element, content: Any) -> None:
+    """Fill an element: with a text, or with others, each its name and its content."""
+    if isinstance(content, str):
+        parent.text = content
+        return
+    for name, below in content:
+        _fill(ElementTree.SubElement(parent, name), below)
 
 
 def define(parser: ArgumentParser) -> None:

@@ -24,6 +24,7 @@ from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, ValueRefused
 from drive_can_bridge.exchange.one_master import END_FIRST, InUse, Ownership
+from drive_can_bridge.process.critical_sections import handled
 from drive_can_bridge.process.locks import Held, HostLock
 from drive_can_bridge.simulation.cia402 import object_text, parse_objects, SimulatedServoDrive
 from drive_can_bridge.simulation.cia402_plant import Habits
@@ -417,14 +418,11 @@ def _signals_as_descriptor() -> Iterator[int]:
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
     woken = signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
-    # a handler, so that neither has its usual effect
-    previous = {number: signal.signal(number, lambda *_: None)
-                for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield reading
+        # a handler, so that neither has its usual effect
+        with handled((signal.SIGINT, signal.SIGTERM), lambda *_: None):
+            yield reading
     finally:
         signal.set_wakeup_fd(woken)
-        for number, handler in previous.items():
-            signal.signal(number, handler)
         os.close(reading)
         os.close(writing)

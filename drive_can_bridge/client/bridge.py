@@ -55,12 +55,6 @@ def role_of(message: Described) -> Role | None:
     return next((each for each in Role if each.value == role), None)
 
 
-def raw_of(parameter: Parameter, value: Value) -> int:
-    """Return the raw integer behind a value of the bridge."""
-    if parameter.scaled:
-        return round((value - parameter.offset) / parameter.scale)
-    return int(value)
-
 
 def _number(facts: dict[str, str], key: str) -> int | None:
     return int(facts[key], 0) if key in facts else None
@@ -142,7 +136,8 @@ class BridgedDrive(Drive):
                 reason = reasons.get(name, _NO_VALUE)
                 made.append(ReadOutcome(name, parameter, reason=reason, kind=kind_of(reason)))
             else:
-                made.append(ReadOutcome(name, parameter, raw_of(parameter, value), value))
+                raw = round(parameter.steps(value)) if parameter.scaled else int(value)
+                made.append(ReadOutcome(name, parameter, raw, value))
         return made
 
     def _reasons(self, names: Sequence[str]) -> list[str]:

@@ -109,15 +109,11 @@ def _check_adapter(tree: Tree, path: Path, values: dict[str, Any], adapters: Ada
     if message is not None:
         tree.wrong((*path, 'interface'), message)
         return None
-    message = adapters.check_channel(interface, values['channel']) if 'channel' in values else None
-    if message is not None:
-        tree.wrong((*path, 'channel'), message)
-    message = adapters.check_bitrate(interface, values['bitrate'])
-    if message is not None:
-        tree.wrong((*path, 'bitrate'), message)
-    message = adapters.check_name(interface, values['adapter']) if values['adapter'] else None
-    if message is not None:
-        tree.wrong((*path, 'adapter'), message)
+    for key, check in (('channel', adapters.check_channel), ('bitrate', adapters.check_bitrate),
+                       ('adapter', adapters.check_name)):
+        message = check(interface, values[key]) if values.get(key, '') != '' else None
+        if message is not None:
+            tree.wrong((*path, key), message)
     return adapters.adapter_keywords(interface)
 
 

@@ -145,19 +145,18 @@ def _bridge(configuration: BridgeConfiguration) -> Iterator[DeclaredParameter]:
             'cyclic_request': [parameter.name for parameter in drive.cyclic_request],
             'cyclic_response': [parameter.name for parameter in drive.cyclic_response],
             'rearm': 'immediate' if drive.rearm_immediate else 'neutral'})
-        yield DeclaredParameter(
-            identity_name(drive.name), '', 'Found out by the bridge when the drive comes online: '
-            'the section identity of its profile. Empty while not known.', False)
-        yield DeclaredParameter(f'{prefix}setpoints', '', 'JSON, made when it is asked for: what '
-                                'may be commanded, its neutral value, and whether it is armed.',
-                                False)
-        yield DeclaredParameter(f'{prefix}commanders', '', 'JSON, made when it is asked for: who '
-                                'publishes commands to this drive, each as "node topic".', False)
-        yield DeclaredParameter(f'{prefix}profile_sha256', drive.profile.sha256,
-                                'SHA-256 of the file of the profile, as it was read.', False)
-        yield DeclaredParameter(f'{prefix}restore', restore_text(drive.profile.restore),
-                                'JSON of what is written around a restored backup: lists before '
-                                'and after of [name, bits, mask].', False)
+        for key, made, description in (
+                ('identity', '', 'Found out by the bridge when the drive comes online: the '
+                 'section identity of its profile. Empty while not known.'),
+                ('setpoints', '', 'JSON, made when it is asked for: what may be commanded, its '
+                 'neutral value, and whether it is armed.'),
+                ('commanders', '', 'JSON, made when it is asked for: who publishes commands to '
+                 'this drive, each as "node topic".'),
+                ('profile_sha256', drive.profile.sha256,
+                 'SHA-256 of the file of the profile, as it was read.'),
+                ('restore', restore_text(drive.profile.restore), 'JSON of what is written around '
+                 'a restored backup: lists before and after of [name, bits, mask].')):
+            yield DeclaredParameter(prefix + key, made, description, False)
         for key, option in FAMILIES[drive.protocol].options_schema.items():
             value = getattr(drive.options, key)
             yield DeclaredParameter(prefix + key, list(value) if isinstance(value, tuple) else

@@ -167,14 +167,6 @@ def read_sections(path: FilePath) -> tuple[list[NodeSection], list[Problem]]:
     return reader.sections, reader.problems
 
 
-def section_names(path: FilePath) -> list[str]:
-    """
-    Return the names of the nodes that a parameter file has sections for.
-
-    :raises OSError: the file cannot be read.
-    """
-    return [section.name for section in read_sections(path)[0]]
-
 
 def unseen_problems(paths: Iterable[FilePath], node: str,
                     ) -> tuple[list[Problem], list[Problem]]:

@@ -136,9 +136,6 @@ class WriteRequest:
 Request = Union[ReadRequest, WriteRequest]
 
 
-def _never() -> bool:
-    return False
-
 
 @dataclass(slots=True)
 class RetryPolicy:
@@ -152,7 +149,7 @@ class RetryPolicy:
 
     timeout: float
     attempts: int
-    offline: Callable[[], bool] = _never
+    offline: Callable[[], bool] = lambda: False
 
     def unanswered(self, attempts: int | None = None, timeout: float | None = None) -> Failure:
         """Return the failure for no answer; None: as often, and in so many s, as configured."""

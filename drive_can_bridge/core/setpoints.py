@@ -39,7 +39,6 @@ class Setpoints:
     :param sample: what is measured, in the order of samples.
     :param sent: what the drive was commanded last.
     :ivar held: those that stay where the axis is.
-    :ivar forgotten: how often all known positions became invalid.
     :ivar changed: some ``raw`` is not what it was; cleared when the telegram is encoded.
     :ivar enabled: commands are accepted at all: the drive is online, nothing is stopping, and a
         drive with control is enabled.
@@ -54,7 +53,6 @@ class Setpoints:
         self.held = tuple(item for item in self.items if isinstance(item, HeldSetpoint))
         self.expires_at = math.inf
         self.rearm_immediate = rearm_immediate
-        self.forgotten = 0
         self.changed = True
         self.enabled = False
         self.ignored_at = -math.inf
@@ -202,7 +200,6 @@ class Setpoints:
 
     def forget(self) -> None:
         """Record that the axes may be anywhere by now: the drive was lost."""
-        self.forgotten += 1
         for setpoint in self.held:
             setpoint.forget()
 

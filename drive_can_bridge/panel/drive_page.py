@@ -22,7 +22,7 @@ from drive_can_bridge.monitor.values import ParameterInfo
 from drive_can_bridge.panel.access import PanelRole
 from drive_can_bridge.panel.feed import Feed, stops, View
 from drive_can_bridge.panel.parts import (
-    advice, box, button, Changing, class_of, in_script, Look, marked, place_in_words, series_name,
+    advice, box, button, Changing, class_of, in_script, Look, marked, place_in_words,
     stop_buttons, Values, words,
 )
 
@@ -67,7 +67,7 @@ class Chart:
     def show(self, snapshot: Snapshot) -> None:
         """Send what is new of the chosen values."""
         found: dict[str, tuple[DriveSnapshot, Shown]] = {
-            series_name(drive, shown): (drive, shown)
+            f'{drive.label}.{shown.name}': (drive, shown)
             for drive in sorted(snapshot.drives, key=lambda drive: drive.name != self._own)
             for shown in (*drive.setpoints, *drive.values)}
         self._offer(found)

@@ -15,7 +15,7 @@ from nicegui import ui
 from nicegui.element import Element
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Shown, Snapshot, StopAction
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Snapshot, StopAction
 from drive_can_bridge.monitor.summary import silence, Tone
 from drive_can_bridge.panel.access import PanelRole
 from drive_can_bridge.panel.feed import stops
@@ -171,8 +171,3 @@ def place_in_words(drive: DriveSnapshot) -> str:
              '' if math.isnan(place.period)
              else f'every {1e3 * place.period:g}\N{NO-BREAK SPACE}ms']
     return ' · '.join(part for part in parts if part)
-
-
-def series_name(drive: DriveSnapshot, shown: Shown) -> str:
-    """Return the name of a value among those of all drives."""
-    return f'{drive.label}.{shown.name}'

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Steps that a signal does not break off in the middle."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 import os
 import signal
@@ -11,6 +11,17 @@ from typing import Any
 from drive_can_bridge.process.beginning import SIGNALS
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+@contextmanager
+def handled(numbers: Iterable[int], handler: Callable[[int, Any], object] | int) -> Iterator[None]:
+    """Handle these signals so for the time of a step."""
+    before = {number: signal.signal(number, handler) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, former in before.items():
+            signal.signal(number, former)
 
 
 @contextmanager
@@ -28,14 +39,10 @@ def finish_first() -> Iterator[None]:
         return
     received: list[int] = []
 
-    def note(number: int, _: Any) -> None:
-        received.append(number)
-    before = {number: signal.signal(number, note) for number in _SIGNALS}
     try:
-        yield
+        with handled(_SIGNALS, lambda number, _: received.append(number)):
+            yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
         if received:
             os.kill(os.getpid(), received[0])   # now by its other handler
 
@@ -90,9 +97,5 @@ def postponed(told: Callable[[], object]) -> Iterator[Interruption]:
             with suppress(OSError):
                 told()
 
-    before = {number: signal.signal(number, note) for number in (*_SIGNALS, signal.SIGHUP)}
-    try:
+    with handled((*_SIGNALS, signal.SIGHUP), note):
         yield noted
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

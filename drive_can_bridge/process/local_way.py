@@ -160,10 +160,6 @@ def peer_of(peer: socket.socket) -> tuple[int, int]:
     return int.from_bytes(found[:4], sys.byteorder), int.from_bytes(found[4:8], sys.byteorder)
 
 
-def user_of(peer: socket.socket) -> int:
-    """Return the user at the other end, as the kernel recorded it when it began to listen."""
-    return peer_of(peer)[1]
-
 
 def trusted_users() -> tuple[int, int]:
     """Return root, and the user of this process: no others are trusted, or obeyed."""
@@ -183,7 +179,8 @@ class Line:
         try:
             self.socket.setblocking(False)
             self.socket.connect(bridge.address)
-            self.believed = user_of(self.socket) in trusted_users()
+            # as the kernel recorded it when the bridge began to listen
+            self.believed = peer_of(self.socket)[1] in trusted_users()
         except BaseException:
             self.socket.close()
             raise

@@ -236,13 +236,13 @@ def _name_the_unstopped(bridge: 'BridgeNode', _: float) -> None:
 
 
 def _nothing_configured(bridge: 'BridgeNode', arguments: Sequence[str]) -> str:
-    from drive_can_bridge.configuration.parameter_file import section_names
+    from drive_can_bridge.configuration.parameter_file import read_sections
     from drive_can_bridge.core import complaints
 
     told = [complaints.nothing_configured(node=bridge.get_fully_qualified_name())]
     for path in _parameter_files(arguments):
         try:
-            names = section_names(Path(path))
+            names = [section.name for section in read_sections(Path(path))[0]]
         except OSError:
             continue
         told.append(complaints.file_is_for(file=path, nodes=', '.join(names) or 'no node'))

@@ -10,7 +10,7 @@ the later one knows the earlier ones of this node, too. Nor has this side found 
 node when it has found one: what is sent to one that it does not know yet is lost.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 import math
@@ -294,7 +294,8 @@ class _Host:
                 service.close()
 
     def _get_to_know(self, service: str) -> None:
-        for name in _made_with(service):
+        # those that change nothing are made together: a greeting is enough for them all
+        for name in ASKING if service in ASKING else (service,):
             self._services[name] = self._client(
                 name, SERVICES[name], AGAIN if name in ASKING else math.inf)
         if self._greeting is not None:
@@ -315,7 +316,7 @@ class _Host:
                 for each in waiting:
                     each.unasked()
                 return
-            greeting.send(GREETING[1].Request(), self._told(now, _nothing), now)
+            greeting.send(GREETING[1].Request(), self._told(now, lambda _: None), now)
             self._greet_at = now + self._pause
             self._pause = min(2.0 * self._pause, LONGEST_PATIENCE)
         greeting.look(now)
@@ -340,10 +341,3 @@ class _Host:
                 each.unasked()
 
 
-def _made_with(service: str) -> Iterable[str]:
-    """Return the services whose clients are made together: a greeting is enough for them all."""
-    return ASKING if service in ASKING else (service,)
-
-
-def _nothing(_: Any) -> None:
-    pass
