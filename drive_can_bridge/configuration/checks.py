@@ -547,8 +547,11 @@ class DriveChecker:
 
     # -- parts ------------------------------------------------------------------------------------
 
-    def _wrong(self, keys: tuple[str, ...], message: Sentence, *, at: Path | None = None) -> None:
-        self._tree.wrong((*self._path, *keys), message, at=at)
+    def _wrong(self, keys: tuple[str, ...], message: Sentence) -> None:
+        self._tree.wrong((*self._path, *keys), message)
+
+    def _wrong_entry(self, key: str, position: int, message: Sentence) -> None:
+        self._tree.wrong((*self._path, key), message, at=(*self._path, key, position))
 
     def _is_damaged(self, key: str) -> bool:
         return self._tree.is_damaged((*self._path, key))
@@ -574,11 +577,9 @@ class DriveChecker:
     def _list(self, key: str, family: Family | None) -> tuple[Parameter, ...]:
         """Resolve a list of parameter names; one with a problem becomes an unlisted stand-in."""
         found: list[Parameter] = []
-        path = (*self._path, key)
         for position, name in enumerate(self._entry.get(key, [])):
-            at = (*path, position)
             if any(parameter.name == name for parameter in found):
-                self._wrong((key,), complaints.twice(name=name), at=at)
+                self._wrong_entry(key, position, complaints.twice(name=name))
                 continue
             parameter = Parameter(name=name, listed=False)
             if self._loaded is not None:
@@ -586,13 +587,13 @@ class DriveChecker:
                 if name not in self._loaded.names:
                     fit = [each for each in self._loaded.names if each not in known
                            or not _direction_problem(key, known[each])]
-                    self._wrong((key,), _built_in(name, family) or complaints.not_in_profile(
-                        name=name, hint=suggestion_of_profile(
-                            name, fit, self._entry.get('profile', ''))), at=at)
+                    hint = suggestion_of_profile(name, fit, self._entry.get('profile', ''))
+                    self._wrong_entry(key, position, _built_in(name, family)
+                                      or complaints.not_in_profile(name=name, hint=hint))
                 parameter = known.get(name, parameter)
             message = _direction_problem(key, parameter)
             if message:
-                self._wrong((key,), message, at=at)
+                self._wrong_entry(key, position, message)
             found.append(parameter)
         return tuple(found)
 
@@ -626,12 +627,10 @@ class DriveChecker:
         for position, parameter in enumerate(drive.cyclic_request):
             is_word = control is not None and control.parameter == parameter.name
             if parameter.limit and is_word:
-                self._wrong(('cyclic_request',), complaints.control_word_limit(
-                    name=parameter.name),
-                            at=(*self._path, 'cyclic_request', position))
+                self._wrong_entry('cyclic_request', position, complaints.control_word_limit(
+                    name=parameter.name))
             if parameter.neutral_from:
-                self._check_held(drive, parameter, is_word=is_word, at=(
-                    *self._path, 'cyclic_request', position))
+                self._check_held(drive, position, parameter, is_word=is_word)
                 continue
             if is_word or not parameter.listed or parameter.neutral is not None:
                 continue
@@ -639,9 +638,8 @@ class DriveChecker:
                 continue
             low, high = parameter.raw_limits
             if not low <= 0 <= high:
-                self._wrong(('cyclic_request',), complaints.no_neutral(
-                    name=parameter.name, allowed=parameter.range_text),
-                            at=(*self._path, 'cyclic_request', position))
+                self._wrong_entry('cyclic_request', position, complaints.no_neutral(
+                    name=parameter.name, allowed=parameter.range_text))
 
     def _look_for_limits(self, drive: DriveConfiguration) -> None:
         """Warn of setpoints that look like limits and are not marked: they are 0 until armed."""
@@ -660,16 +658,16 @@ class DriveChecker:
                     name=parameter.name, rest=rest, unit=parameter.unit and ' ' + parameter.unit),
                 at=(*self._path, 'cyclic_request', position))
 
-    def _check_held(self, drive: DriveConfiguration, parameter: Parameter, *, is_word: bool,
-                    at: Path) -> None:
+    def _check_held(self, drive: DriveConfiguration, position: int, parameter: Parameter, *,
+                    is_word: bool) -> None:
         """Check what an axis needs that has to stay where it is (``neutral_from``)."""
         name, measured = parameter.name, parameter.neutral_from
         if is_word:
-            self._wrong(('cyclic_request',), complaints.control_word_held(name=name), at=at)
+            self._wrong_entry('cyclic_request', position, complaints.control_word_held(name=name))
         if not self._is_damaged('cyclic_response') and all(
                 other.name != parameter.neutral_from for other in drive.cyclic_response):
-            self._wrong(('cyclic_request',), complaints.measured_not_listed(
-                name=name, measured=measured), at=at)
+            self._wrong_entry('cyclic_request', position, complaints.measured_not_listed(
+                name=name, measured=measured))
         if drive.rearm_immediate:
             self._wrong(('rearm',), complaints.immediate_jumps(name=name, measured=measured))
         if getattr(drive.options, 'broadcast', 'none') != 'none':

@@ -300,7 +300,7 @@ class ParameterServices:
             alike.setdefault((failure.reason, of_name), []).append(parameter)
         for (reason, _), (first, *more) in alike.items():
             others = f' and {len(more)} more' if more else ''
-            self._failed(f'{what} {_title(first)}{others}', reason, 0)
+            self._failed(f'{what} {first.name} ({first.address}){others}', reason, 0)
 
     def _announce(self, written: list[tuple[str, Parameter, int]]) -> None:
         if not written:
@@ -344,8 +344,3 @@ def _result(outcome: Outcome) -> SetParametersResult:
         return SetParametersResult(successful=True, reason=outcome.note)
     return SetParametersResult(
         successful=False, reason=outcome.reason if isinstance(outcome, Failure) else 'no result')
-
-
-def _title(parameter: Parameter) -> str:
-    """Return a parameter's name for the log: ``ramp_time (P30)``."""
-    return f'{parameter.name} ({parameter.address})'

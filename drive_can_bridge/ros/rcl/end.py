@@ -220,13 +220,11 @@ class TopicEnd:
 
     def services(self) -> Names:
         """Return all services that have been discovered, with their types."""
-        found: Names = self._do('services')
-        return found
+        return self._do('services')
 
     def topics(self) -> Names:
         """Return all topics that have been discovered, with their types."""
-        found: Names = self._do('topics')
-        return found
+        return self._do('topics')
 
     def servers(self, service: str) -> int:
         """Return how many servers of this name are discovered."""
@@ -238,23 +236,19 @@ class TopicEnd:
 
         :param topic: as the middleware has it.
         """
-        found: list[bytes] = self._do('who_reads', topic)
-        return found
+        return self._do('who_reads', topic)
 
     def asking(self, kind: Any, name: str) -> Asking:
         """Return a client of a service of this full name."""
-        made: Asking = self._do('asking', kind, name)
-        return made
+        return self._do('asking', kind, name)
 
     def reading(self, kind: Any, topic: str, quality: QoSProfile) -> ReadingEnd:
         """Return a subscription."""
-        made: ReadingEnd = self._do('reading', kind, topic, quality)
-        return made
+        return self._do('reading', kind, topic, quality)
 
     def writing(self, kind: Any, topic: str, quality: QoSProfile) -> Writing:
         """Return a publisher."""
-        made: Writing = self._do('writing', kind, topic, quality)
-        return made
+        return self._do('writing', kind, topic, quality)
 
     def close(self) -> None:
         """Remove the node of its own from the graph."""

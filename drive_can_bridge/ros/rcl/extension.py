@@ -32,6 +32,15 @@ RCLError: type[Exception] = getattr(rclpy_implementation, 'RCLError', RuntimeErr
 GONE = InvalidHandle, RCLError
 
 
+def lacking(names: Iterable[str]) -> str:
+    """Return which member there is not; '': they are all there."""
+    try:
+        look_for(names)
+    except Unfit as error:
+        return str(error)
+    return ''
+
+
 def look_for(names: Iterable[str]) -> None:
     """
     Check that members exist.

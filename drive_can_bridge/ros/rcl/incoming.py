@@ -19,8 +19,7 @@ from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 
-from drive_can_bridge.ros.rcl.extension import extension, look_for
-from drive_can_bridge.ros.rcl.unfit import Unfit
+from drive_can_bridge.ros.rcl.extension import extension, lacking
 
 MEMBERS = ('Subscription.take_message', 'Subscription.get_publisher_count', 'EventHandle',
            'EventHandle.take_event', 'EventHandle.destroy_when_not_in_use')
@@ -71,11 +70,7 @@ def by_hand(subscription: Any, look: Callable[[], None] = lambda: None,
 
 def why_not_by_hand() -> str:
     """Return why messages cannot be polled; '': they can."""
-    try:
-        look_for(MEMBERS)
-    except Unfit as error:
-        return str(error)
-    return ''
+    return lacking(MEMBERS)
 
 
 def subscribe(node: Node, kind: type, topic: str, quality: QoSProfile,
@@ -122,11 +117,8 @@ def _by_executor(node: Node, kind: type, topic: str, quality: QoSProfile,
     if used.history is HistoryPolicy.KEEP_LAST:     # the newest, as the middleware does
         came = deque(maxlen=used.depth or 1)
     return Incoming(subscription, lambda: came.popleft() if came else None,
-                    lambda: node.count_publishers(subscription.topic_name), _nothing, _nothing)
-
-
-def _nothing() -> None:
-    pass
+                    lambda: node.count_publishers(subscription.topic_name), lambda: None,
+                    lambda: None)
 
 
 def _never(_: Any) -> None:

@@ -69,8 +69,7 @@ def _complain(missing: Sequence[str]) -> None:
 
 def overrides(node: Node) -> Mapping[str, Parameter]:
     """Return the overrides of a node from parameter files and command line, declared or not."""
-    found: Mapping[str, Parameter] = node._parameter_overrides
-    return found
+    return node._parameter_overrides
 
 
 def set_read_only(node: Node, name: str, value: Any) -> None:

@@ -5,8 +5,7 @@ from collections.abc import Callable
 
 from rclpy.publisher import Publisher
 
-from drive_can_bridge.ros.rcl.extension import look_for
-from drive_can_bridge.ros.rcl.unfit import Unfit
+from drive_can_bridge.ros.rcl.extension import lacking
 
 
 def publish_bytes(publisher: Publisher) -> Callable[[bytes], None]:
@@ -15,15 +14,9 @@ def publish_bytes(publisher: Publisher) -> Callable[[bytes], None]:
 
     The public way, ``Publisher.publish``, costs more than the publishing itself.
     """
-    straight: Callable[[bytes], None] = (
-        publisher.publish if why_not_straight() else publisher.handle.publish_raw)
-    return straight
+    return publisher.publish if why_not_straight() else publisher.handle.publish_raw
 
 
 def why_not_straight() -> str:
     """Return why bytes cannot be published; '': they can."""
-    try:
-        look_for(['Publisher.publish_raw'])
-    except Unfit as error:
-        return str(error)
-    return ''
+    return lacking(['Publisher.publish_raw'])
