@@ -2,28 +2,23 @@
 """
 The subcommand ``drive_can explain``: what a code means, and what to do about it.
 
-The page ``docs/messages.md`` is made of the same rows: ``python -m drive_can_bridge.cli.explain``
-writes it in a checkout; a test compares it.
+The page ``docs/messages.md`` is made of the same rows, by ``docs/messages.py`` in a checkout.
 """
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 import difflib
-import inspect
 from itertools import groupby
-from pathlib import Path
 import re
 from string import Formatter
-from types import ModuleType
 
 from drive_can_bridge.cli.command import complain, FAILED, print_json, say
 from drive_can_bridge.cli.explained_words import KEYS, rows_of_word, VERDICTS
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.codes import CODES, MODULES
+from drive_can_bridge.core.codes import CODES
 from drive_can_bridge.core.messages import Text
 from drive_can_bridge.core.text import counted, printable
 
-PAGE = Path('docs', 'messages.md')
 #: codes that are named, and rows that are shown, where none is the one
 _NEAREST = 5
 #: letters that are enough to look for
@@ -33,40 +28,14 @@ _ENOUGH_OF_ALL = 4
 #: what ends a name before a text
 _BEFORE = re.compile(r'(?<=\S): ')
 #: put before the codes of files in the anchors of the page, where a code is of both
-_OF_FILES = 'file-'
+OF_FILES = 'file-'
 #: what the codes of a part of the catalogue stand for, behind the code
 _WHERE = {'drives and buses': 'said about a drive or a bus', 'commands': 'said by a command',
           'states': 'a state of a drive',
           'files': 'said about a parameter file or a profile', 'keys': 'a key of diagnostics',
           'verdicts': 'stands before a reason', 'numbers': 'a number of the drive'}
-_HEADING = re.compile(r'# -- (.*?)(?: -+)?')
 #: where a clause of a row ends; not the comma that joins the names of a field
 _CLAUSE = re.compile(r'[,;] (?!\})')
-_ROW = re.compile(r'(\w+) = Text\(')
-
-_HEAD = """\
-# What the messages mean, and what to do
-
-Search this page for the `code` of a status in `/diagnostics` ([what else it
-has](ros_interface.md)), or give it to `drive_can explain`, which takes a line of the log, or some
-words of one, too:
-
-```sh
-drive_can explain not_armed bus_up
-drive_can explain "conveyor: read ramp_time (P30): no answer in 0.1 s, 3 attempts"
-```
-
-In `<brackets>` stands what changes; several texts of a code are its forms. Where the last column
-is empty, the text says what is allowed. `messages.md#not_armed` leads to the row of that code.
-
-Made by `python -m drive_can_bridge.cli.explain`, of the rows that `core/codes.py` names.
-"""
-_FILES = """
-# What can be wrong with a parameter file or a profile
-
-`drive_can validate` and the bridge say it with file, line and key; each text says what is allowed.
-"""
-_TABLE = ['', '| code | text | what to do |', '|---|---|---|']
 
 
 def define(parser: ArgumentParser) -> None:
@@ -145,7 +114,7 @@ def _named(text: str) -> list[tuple[str, Text]]:
 def _rows_of_code(word: str) -> dict[tuple[str, str], tuple[str, Text]]:
     """Return the rows of one code, as the page, and links to it, write it."""
     anchor = word.strip('`').rpartition('#')[2]
-    code = anchor.removeprefix(_OF_FILES)
+    code = anchor.removeprefix(OF_FILES)
     return {(about, code): (about, rows[code]) for about, rows in CODES.items()
             if code in rows and (about == 'files' or code == anchor)}
 
@@ -233,51 +202,5 @@ def _pieces(text: str) -> Iterator[str]:
             yield f'<{name}>'
 
 
-def page() -> str:
-    """Return the text of the page."""
-    of_drives = sorted(
-        [section for about, modules in MODULES.items() if about != 'files'
-         for module in modules for section in _sections(module, '')],
-        key=lambda section: not section[0].startswith('Diag'))
-    of_files = [section for module in MODULES['files']
-                for section in _sections(module, 'files: ')]
-    lines = [_HEAD]
-    for sections in (of_drives, of_files):
-        lines += [f'* [{title}](#{_slug(title)})' for title, _ in sections]
-    for sections, head, prefix in ((of_drives, '', ''), (of_files, _FILES, _OF_FILES)):
-        lines.append(head)
-        for title, rows in sections:
-            lines += ['', f'## {title}', *_TABLE]
-            lines += [f'| <a id="{prefix}{row.code}"></a>`{row.code}` | {_cell(row)} | '
-                      f'{_escaped(row.do) if row.has_advice else ""} |' for row in rows]
-    return re.sub('\n{3,}', '\n\n', '\n'.join(lines)) + '\n'
-
-
-def _sections(module: ModuleType, prefix: str) -> list[tuple[str, list[Text]]]:
-    """Return the rows below each heading of a catalogue."""
-    sections: list[tuple[str, list[Text]]] = []
-    for line in inspect.getsource(module).splitlines():
-        heading, row = _HEADING.fullmatch(line), _ROW.match(line)
-        if heading:
-            title = f'{prefix}{heading[1]}'
-            sections.append((title[:1].upper() + title[1:], []))
-        elif row and row[1] != sentences.uncoded.code:
-            sections[-1][1].append(module.CODES[row[1]])
-    return sections
-
-
-def _slug(title: str) -> str:
-    """Return the anchor of a heading, as GitHub makes it."""
-    return re.sub(r'[^\w -]', '', title.lower()).replace(' ', '-')
-
-
-def _cell(row: Text) -> str:
-    return '<br>'.join(f'`{_escaped(text.strip())}`' for text in forms(row))
-
-
-def _escaped(text: str) -> str:
-    return text.replace('|', '\\|')
-
-
 if __name__ == '__main__':
-    PAGE.write_text(page(), encoding='utf-8')
+    raise SystemExit('docs/messages.py writes docs/messages.md')

@@ -2,7 +2,7 @@
 """
 CAN adapters that people own: the rows from which docs/adapters.md and ``validate`` are made.
 
-``python -m drive_can_bridge.cli.adapters`` writes the page in a checkout; a test compares it.
+``docs/adapters.py`` writes the page in a checkout; a test compares it.
 """
 
 from dataclasses import dataclass

@@ -4,6 +4,7 @@
 import json
 from pathlib import Path
 import re
+import runpy
 
 import pytest
 
@@ -14,15 +15,16 @@ from drive_can_bridge.core.codes import code_of, CODES
 from drive_can_bridge.protocols.cannord.states import InverterState
 from drive_can_bridge.protocols.cia402.states import ServoState
 
+SCRIPT = runpy.run_path(str(Path(__file__).parents[2] / 'docs' / 'messages.py'))
+
 
 def test_the_page_is_current() -> None:
-    """Written again by ``python -m drive_can_bridge.cli.explain``."""
-    page = Path(__file__).parents[2] / explain.PAGE
-    assert page.read_text(encoding='utf-8') == explain.page()
+    """Written again by ``docs/messages.py``."""
+    assert SCRIPT['PAGE'].read_text(encoding='utf-8') == SCRIPT['page']()
 
 
 def test_the_page_has_every_code() -> None:
-    text = explain.page()
+    text = SCRIPT['page']()
     missing = [code for about, rows in CODES.items() for code in rows
                if f'<a id="{"file-" * (about == "files")}{code}"></a>`{code}` |' not in text]
     assert missing == ['uncoded'], 'which stands for the text of something else'
@@ -31,7 +33,7 @@ def test_the_page_has_every_code() -> None:
 
 
 def test_the_contents_lead_to_headings() -> None:
-    text = explain.page()
+    text = SCRIPT['page']()
     slugs = [re.sub(r'[^\w -]', '', title.lower()).replace(' ', '-')
              for title in re.findall('^## (.*)$', text, re.MULTILINE)]
     assert re.findall(r'^\* \[.*\]\(#(.*)\)$', text, re.MULTILINE) == slugs
@@ -103,7 +105,7 @@ def test_a_code_as_anchors_and_pages_write_it(
 
 
 def test_each_anchor_of_the_page_leads_to_its_row() -> None:
-    for anchor in re.findall('<a id="(.*?)">', explain.page()):
+    for anchor in re.findall('<a id="(.*?)">', SCRIPT['page']()):
         assert [row.code for _, row in explain.rows_of(anchor)][:1] == [
             anchor.removeprefix('file-')], anchor
 

@@ -2,13 +2,13 @@
 """The table of adapters: complete, found by what USB shows, and what it says of a bus."""
 
 from pathlib import Path
+import runpy
 from typing import Any
 
 import can.interfaces
 import pytest
 from usb_host import Host
 
-from drive_can_bridge.cli import adapters
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.transport.known_adapters import (
     BY_NAME, NOT_ON_LINUX, row_of, row_of_port, ROWS, traits_of,
@@ -27,9 +27,9 @@ def host_fixture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Host:
 
 
 def test_the_page_is_current() -> None:
-    """Written again by ``python -m drive_can_bridge.cli.adapters``."""
-    page = Path(__file__).parents[2] / adapters.PAGE
-    assert page.read_text(encoding='utf-8') == adapters.page()
+    """Written again by ``docs/adapters.py``."""
+    script = runpy.run_path(str(Path(__file__).parents[2] / 'docs' / 'adapters.py'))
+    assert script['PAGE'].read_text(encoding='utf-8') == script['page']()
 
 
 def test_every_interface_has_a_row_or_a_reason() -> None:
