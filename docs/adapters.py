@@ -78,11 +78,12 @@ def page() -> str:
 
 def _cells(row: Row) -> Iterator[str]:
     listens = row.listen_only
+    keys = {'interface': row.interface, 'channel': row.channel, **dict(row.options)}
     yield f'`{row.name}`'
     yield row.title
-    yield f'`{row.lines}`'
+    yield f'`{", ".join(f"{key}: {value}" for key, value in keys.items())}`'
     yield row.differs
-    yield row.cure.replace('|', '\\|')
+    yield '; or '.join(filter(None, (row.cure, row.instead))).replace('|', '\\|')
     yield row.tried
     yield '–' if not listens else f'`{listens.strip(chr(34))}`'
 

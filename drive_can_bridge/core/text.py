@@ -81,23 +81,19 @@ def seems_limit(*texts: str) -> bool:
     return any(word in text.lower() for text in texts for word in ('limit', 'max'))
 
 
+#: types in words; a bool is an integer, too
+_TYPES = ((bool, 'a bool'), (str, 'a string'), (int, 'an integer'), (float, 'a number'),
+          (dict, 'a mapping'))
+
+
 def describe_type(value: Any) -> str:
     """Return the type of a value in words."""
-    if isinstance(value, bool):
-        return 'a bool'
-    if isinstance(value, str):
-        return 'a string'
-    if isinstance(value, int):
-        return 'an integer'
-    if isinstance(value, float):
-        return 'a number'
-    if isinstance(value, dict):
-        return 'a mapping'
+    for kind, words in _TYPES:
+        if isinstance(value, kind):
+            return words
     if isinstance(value, (list, tuple, array)):     # which is how rclpy gives numbers
         return 'a list' if value else 'an empty list'
-    if value is None:
-        return 'no value'
-    return f'a {type(value).__name__}'
+    return 'no value' if value is None else f'a {type(value).__name__}'
 
 
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | None:

@@ -34,6 +34,7 @@ class Row:
     :param options: further keys of the example.
     :param differs: what it does otherwise, in words.
     :param cure: which setting helps.
+    :param instead: what else does, also where its driver is missing.
     :param tried: how this is known: a letter of :data:`TRIED`, or words.
     :param usb: how the USB device begins to name itself: number, then product.
     :param uart: a real serial line is behind the port, whose speed counts.
@@ -59,20 +60,15 @@ class Row:
     listen_only: str = ''
     drops: tuple[Dropped, ...] = ()
     module: str = ''
+    instead: str = ''
 
     @property
     def helps(self) -> str:
         """What to do where its driver is missing, in plain text; '': nothing is known."""
         if self.module:
             return f'pip install {self.module}'
-        instead = self.cure.rpartition('; or ')[2].replace('`', '')
-        return '' if instead.startswith('none ') else instead
-
-    @property
-    def lines(self) -> str:
-        """Its keys in a parameter file, in one line."""
-        keys = {'interface': self.interface, 'channel': self.channel, **dict(self.options)}
-        return ', '.join(f'{key}: {value}' for key, value in keys.items())
+        helps = (self.instead or self.cure).replace('`', '')
+        return '' if helps.startswith('none ') else helps
 
 
 def _identifier(number: int) -> Route:
@@ -195,8 +191,8 @@ ROWS: tuple[Row, ...] = (
     Row('kvaser', 'Kvaser', 'kvaser', 0,
         'needs libcanlib.so; channels count from 0; shares a channel with other programs, whose '
         'frames it shows, too; takes virtual channels for real ones',
-        "`accept_virtual: false`; or the kernel's driver kvaser_usb: `socketcan`", SOURCE,
-        listen_only='driver_mode: false'),
+        '`accept_virtual: false`', SOURCE, listen_only='driver_mode: false',
+        instead="the kernel's driver kvaser_usb: `socketcan`"),
     Row('ixxat', 'IXXAT (HMS)', 'ixxat', 0,
         'python-can knows its Windows library only', "IXXAT's driver for SocketCAN: `socketcan`",
         SOURCE),
