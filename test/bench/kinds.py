@@ -157,5 +157,6 @@ KINDS: dict[str, Kind] = {
     'CiA 402, stays in quick stop, no 605Ah': _servo(OptionlessServo),
     'CANnord': _cannord(),
     'CANnord, group of two': _cannord(2),
+    'CANnord, group of three': _cannord(3),
     'CANnord, group of four': _cannord(4),
 }

@@ -25,7 +25,8 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.families import make_sessions
 
-KINDS = ('CiA 402', 'CANnord', 'CANnord, group of two', 'CANnord, group of four',
+KINDS = ('CiA 402', 'CANnord', 'CANnord, group of two', 'CANnord, group of three',
+         'CANnord, group of four',
          '29 bit, no word', '29 bit, word in its slot', '29 bit, no word, maps assumed',
          '29 bit, maps assumed, word in its slot')
 

@@ -135,8 +135,8 @@ class Group:
         self._put(self._broadcast, payloads, *exchange.audience)
         if exchange.sending_more:
             alone = [member for member in members if member.session.unacknowledged]
-        else:   # a stop reaches also those that do not listen to broadcasts
-            turns = math.ceil(count / STOP_CYCLES) if stopping else 1
+        else:   # a stop reaches also those that do not listen to broadcasts, whose answers may lag
+            turns = math.ceil(count / (STOP_CYCLES - 1)) if stopping else 1
             alone = [members[(self._turn + place) % count] for place in range(turns)]
             self._turn = (self._turn + turns) % count
         for member in alone:
