@@ -24,12 +24,11 @@ import struct
 import sys
 from typing import Any, NamedTuple, Union
 
-from drive_can_bridge.core import complaints, frame_sentences, sentences
+from drive_can_bridge.core import complaints, sentences
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.drive_services import DriveServices
-from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import ForeignMasterSeen, ProcessDataReceived
-from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX, worst_bits
+from drive_can_bridge.core.frame import Frame, Route, worst_bits
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import Outcome, Written
@@ -71,10 +70,7 @@ def encode_task(base: int, station: int, task: Task) -> Frame:
 
 
 def decode_task(data: bytes) -> Task:
-    try:
-        return Task(*struct.unpack('<BHH', data))
-    except struct.error as error:
-        raise RemoteProtocolError(frame_sentences.undecided(error)) from None
+    return Task(*struct.unpack('<BHH', data.ljust(5, b'\0')[:5]))
 
 
 def encode_words(words: Iterable[int]) -> bytes:
@@ -173,12 +169,7 @@ class ToySession(Session):
         if base == SAMPLE:
             self._receive_sample(frame.data, now, now - age)
         elif base == REPLY:
-            try:
-                answered = self._channel.receive(decode_task(frame.data), now)
-            except RemoteProtocolError as error:
-                self.report.reject(sentences.malformed(error.sentence))
-                return
-            if not answered:
+            if not self._channel.receive(decode_task(frame.data), now):
                 self.report.unasked(sentences.unasked('answer'), self._channel.late(now - age),
                                     now)
         else:
@@ -274,7 +265,7 @@ class ToyProber(Prober):
     """Asks how loud it is."""
 
     def __init__(self, drive: DriveConfiguration) -> None:
-        super().__init__(drive, [_route(TASK + drive.station)])
+        super().__init__(drive, [Route.of(TASK + drive.station)])
 
     def converse(self) -> Conversation:
         data = yield from self.ask(Question(
@@ -291,10 +282,6 @@ class ToyOptions:
     """What only this family has."""
 
     volume: int = option(3, 'How loud it is.', minimum=0, maximum=11)
-
-
-def _route(identifier: int) -> Route:
-    return Route(identifier, STANDARD_IDENTIFIER_MAX, False)
 
 
 class Toy(Family):
@@ -314,7 +301,7 @@ class Toy(Family):
                                 complaints.number_missing(family=self.name, most=0xFFFF))
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
-        return [Claim(_route(base + drive.station), f'{base + drive.station:03X}h')
+        return [Claim(Route.of(base + drive.station), f'{base + drive.station:03X}h')
                 for base in BASES]
 
     def bits_per_second(self, drive: DriveConfiguration) -> float:

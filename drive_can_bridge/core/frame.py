@@ -44,6 +44,12 @@ class Route(NamedTuple):
     mask: int
     extended: bool
 
+    @classmethod
+    def of(cls, identifier: int, *, extended: bool = False) -> 'Route':
+        """Return the route of one identifier."""
+        return cls(identifier, EXTENDED_IDENTIFIER_MAX if extended else STANDARD_IDENTIFIER_MAX,
+                   extended)
+
     def matches(self, frame: Frame) -> bool:
         """Return whether this route takes the frame."""
         return (frame.extended == self.extended

@@ -221,17 +221,16 @@ class Channel(Generic[StepT, ReplyT]):
 
     # -- answers that come too late ---------------------------------------------------------------
 
-    def late(self, received_at: float,
-             answers: Callable[[StepT], bool] = lambda step: True) -> float | None:
+    def late(self, received_at: float, answer: Any = None) -> float | None:
         """
         Record an answer that nobody waits for.
 
-        :param answers: tells whether it may be that to a step.
+        :param answer: as :meth:`.Transactor.answers` wants it.
         :return: how many s ago the step was given up that it answers; None: there is none.
         """
         horizon = received_at - LATE_MAX - self._transactor.silence
         for place, (at, step) in enumerate(self._given_up):
-            if at >= horizon and answers(step):
+            if at >= horizon and self._transactor.answers(answer, step):
                 del self._given_up[place]
                 return max(0.0, received_at - at)
         return None

@@ -127,6 +127,10 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
         :raises RemoteProtocolError: it is malformed, or belongs to something else.
         """
 
+    def answers(self, answer: Any, step: StepT) -> bool:
+        """Return whether an answer may be that to a step that was given up."""
+        return True
+
     def end(self, step: StepT, reply: ReplyT, now: float) -> None:
         """End the exchange for a step, if it is still under way, by what is no answer."""
         if self.step is step:

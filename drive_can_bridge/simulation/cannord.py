@@ -302,7 +302,7 @@ class SimulatedCannordInverter(SimulatedDrive):
         found, options = super().find_routes()[:len(MessageObject)], self.configuration.options
         extended, station = options.extended_identifiers, self.configuration.station
         if options.broadcast != 'none':
-            found += [identifiers.route(each, extended=extended)
+            found += [Route.of(each, extended=extended)
                       for each in identifiers.broadcasts(station, extended=extended)]
         return found
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from drive_can_bridge.core.adapter import AdapterTraits, Dropped
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.core.frame import Route
 from drive_can_bridge.transport.bus_identity import device_of
 from drive_can_bridge.transport.usb_serial import latency_timer, port_name, usb_device
 
@@ -71,10 +71,6 @@ class Row:
         return '' if helps.startswith('none ') else helps
 
 
-def _identifier(number: int) -> Route:
-    return Route(number, STANDARD_IDENTIFIER_MAX, False)
-
-
 ROWS: tuple[Row, ...] = (
     # -- the kernel
     Row('socketcan', 'a CAN controller of Linux: on the board, PCI, SPI', 'socketcan', 'can0',
@@ -129,8 +125,8 @@ ROWS: tuple[Row, ...] = (
         'real serial line of 500 kbaud', 'another adapter for CANopen and for 29-bit drives; '
         '`@500000` in `channel`', f'{PARSER} (mintynet f1f6b22)',
         options=(('adapter', 'esp32_slcan'),), uart=True,
-        drops=(Dropped('NMT (identifier 000h)', _identifier(0)),
-               Dropped('SYNC (no data)', _identifier(0x80)),
+        drops=(Dropped('NMT (identifier 000h)', Route.of(0)),
+               Dropped('SYNC (no data)', Route.of(0x80)),
                Dropped('29-bit identifiers', Route(0, 0, True)))),
     Row('slcan_tcp', 'SLCAN over TCP: ser2net, ESP8266 and ESP32 bridges', 'slcan',
         'socket://10.0.0.5:7000',

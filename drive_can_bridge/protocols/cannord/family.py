@@ -11,7 +11,7 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.status_bits import STATUS_NAME
 from drive_can_bridge.protocols.cannord.identifiers import (
-    ADDRESS_MAX, broadcast_identifier, broadcasts, groups, identifier, MessageObject, route)
+    ADDRESS_MAX, broadcast_identifier, broadcasts, groups, identifier, MessageObject)
 from drive_can_bridge.protocols.cannord.monitoring import TIMEOUT_NUMBER, timeout_parameter
 from drive_can_bridge.protocols.cannord.options import CannordOptions, PROBED
 from drive_can_bridge.protocols.cannord.parameter_frame import INDEX_MAX, NUMBER_MAX
@@ -78,19 +78,19 @@ class Cannord(Family):
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         """Return all identifiers of the drive on its bus; a broadcast one is shared."""
         extended = drive.options.extended_identifiers
-        found = [Claim(route(identifier(kind, drive.station, extended=extended),
+        found = [Claim(Route.of(identifier(kind, drive.station, extended=extended),
                              extended=extended), f'{purpose} {drive.station}')
                  for kind, purpose in _PURPOSES.items()]
         broadcast = broadcast_identifier(drive)
         if broadcast is not None:
-            found.append(Claim(route(broadcast, extended=extended), 'broadcast process data',
+            found.append(Claim(Route.of(broadcast, extended=extended), 'broadcast process data',
                                shared='cannord broadcast', heard=False, once=True))
         return found
 
     def overheard(self, drive: DriveConfiguration) -> list[Route]:
         """Return both broadcasts: an inverter that is set to listen obeys both."""
         extended = drive.options.extended_identifiers
-        return [route(each, extended=extended) for each in broadcasts(
+        return [Route.of(each, extended=extended) for each in broadcasts(
             drive.station, extended=extended)]
 
     def bits_per_second(self, drive: DriveConfiguration) -> float:

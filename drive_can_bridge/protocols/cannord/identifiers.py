@@ -25,7 +25,6 @@ from enum import Enum
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import LocalProtocolError
-from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Route, STANDARD_IDENTIFIER_MAX
 
 ADDRESS_MAX = 255
 PARAMETER_BASE = 512
@@ -78,11 +77,6 @@ def decode_identifier(value: int) -> tuple[MessageObject, int] | None:
         return None
     address = value % PARAMETER_BASE // 2
     return MessageObject(value - 2 * address), address
-
-
-def route(value: int, *, extended: bool = False) -> Route:
-    """Return the route that matches exactly this identifier."""
-    return Route(value, EXTENDED_IDENTIFIER_MAX if extended else STANDARD_IDENTIFIER_MAX, extended)
 
 
 def _formed(short: int, extended: bool) -> int:

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.protocols.cannord.identifiers import (
-    broadcasts, identifier, MessageObject, route)
+    broadcasts, identifier, MessageObject)
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     error_text, ERRORS, NUMBER_MAX, ParameterLayout, ResponseId, Task)
 from drive_can_bridge.protocols.scanner import (
@@ -74,7 +74,7 @@ class CannordProber(Prober):
             identifier(kind, station, extended=extended) for kind in (
                 MessageObject.PARAMETER_TASK, MessageObject.PARAMETER_RESPONSE,
                 MessageObject.PROCESS_REQUEST))
-        super().__init__(drive, [route(each, extended=extended) for each in (
+        super().__init__(drive, [Route.of(each, extended=extended) for each in (
             self._task, process_request, *broadcasts(station, extended=extended))])
         self._extended: bool = extended
 

@@ -18,7 +18,6 @@ data beside them: lower identifiers win on the bus.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -184,7 +183,7 @@ class CannordSession(Session):
                 self.report.reject(sentences.not_of_this_drive(str(frame)))
         except Unasked as error:
             self.report.unasked(sentences.malformed(error.sentence), self._channel.late(
-                now - age, partial(self._transactor.answers, data)), now)
+                now - age, data), now)
         except RemoteProtocolError as error:
             self.report.reject(sentences.malformed(error.sentence))
 

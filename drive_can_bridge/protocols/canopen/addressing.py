@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import re
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.core.frame import Route
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.family import Claim, Complaint, option, out_of_range
 
@@ -69,8 +69,7 @@ def reserved_claims(drive: DriveConfiguration) -> list[Claim]:
 
 
 def _claims(purposes: Mapping[int, str], *, shared: str = '', heard: bool = True) -> list[Claim]:
-    return [Claim(Route(identifier, STANDARD_IDENTIFIER_MAX, False),
-                  f'{identifier:03X}h ({purpose})', shared, heard)
+    return [Claim(Route.of(identifier), f'{identifier:03X}h ({purpose})', shared, heard)
             for identifier, purpose in purposes.items()]
 
 

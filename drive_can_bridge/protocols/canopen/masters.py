@@ -8,7 +8,7 @@ SDO server of a node are on an identifier that is its own.
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import RemoteProtocolError
-from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import NmtCommand
@@ -22,12 +22,12 @@ _COMMANDS = {NmtCommand.START: 'start', NmtCommand.STOP: 'stop',
              NmtCommand.RESET_NODE: 'reset node',
              NmtCommand.RESET_COMMUNICATION: 'reset communication'}
 #: NMT commands; they belong to no drive
-NMT_ROUTE = Route(network.NMT_IDENTIFIER, STANDARD_IDENTIFIER_MAX, False)
+NMT_ROUTE = Route.of(network.NMT_IDENTIFIER)
 
 
 def sdo_route(node: int) -> Route:
     """Return the requests to the SDO server of a node."""
-    return Route(sdo.REQUEST_BASE + node, STANDARD_IDENTIFIER_MAX, False)
+    return Route.of(sdo.REQUEST_BASE + node)
 
 
 def nmt_command(frame: Frame, node: int) -> Sentence:

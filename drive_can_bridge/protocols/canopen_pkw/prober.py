@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
-from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.sdo import TEXTS
@@ -59,7 +59,7 @@ class PkwProber(Prober):
 
     def __init__(self, drive: DriveConfiguration) -> None:
         self._toggle = False
-        super().__init__(drive, [Route(each, STANDARD_IDENTIFIER_MAX, False) for each in (
+        super().__init__(drive, [Route.of(each) for each in (
             drive.options.request_cob_id, sdo.REQUEST_BASE + drive.station,
             network.NMT_IDENTIFIER)])
 

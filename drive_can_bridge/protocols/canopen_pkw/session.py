@@ -308,8 +308,7 @@ class PkwSession(Session):
                 self._exchange.received_at = now - age
                 message = pkw.decode(data, self._layout)
                 if not self._channel.receive(message, now):
-                    late = self._channel.late(
-                        now - age, lambda step: self._transactor.answers(message, step))
+                    late = self._channel.late(now - age, message)
                     self.report.unasked(sentences.unasked_pkw(str(message)), late, now)
             elif self._node_says(identifier, data, now):
                 self._end_futile_stop(now)

@@ -6,7 +6,7 @@ from typing import Any
 
 from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX, worst_bits
+from drive_can_bridge.core.frame import Route, worst_bits
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.status_bits import STATUS_NAME
@@ -278,5 +278,5 @@ class Cia402(Family):
 
 
 def _shared(identifier: int, purpose: str, mark: str) -> Claim:
-    return Claim(Route(identifier, STANDARD_IDENTIFIER_MAX, False),
-                 f'{identifier:03X}h ({purpose})', mark, heard=False, once=True)
+    return Claim(Route.of(identifier), f'{identifier:03X}h ({purpose})', mark, heard=False,
+                 once=True)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
-from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.core.frame import Route
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.sdo import SdoCommand, SdoMessage
 from drive_can_bridge.protocols.cia402 import states
@@ -70,7 +70,7 @@ class Cia402Prober(Prober):
     """
 
     def __init__(self, drive: DriveConfiguration) -> None:
-        super().__init__(drive, [Route(each, STANDARD_IDENTIFIER_MAX, False) for each in (
+        super().__init__(drive, [Route.of(each) for each in (
             *(request.identifier for request in request_pdos(drive)),
             sdo.REQUEST_BASE + drive.station, network.NMT_IDENTIFIER)])
 

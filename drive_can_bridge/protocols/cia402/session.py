@@ -392,7 +392,7 @@ class Cia402Session(Session):
                     self._heartbeats.was_missed(self._answers.timing, now)
         except Unasked as error:
             self.report.unasked(sentences.malformed(error.sentence), self._channel.late(
-                now - age, partial(self._transactor.answers, data)), now)
+                now - age, data), now)
         except RemoteProtocolError as error:
             self.report.reject(sentences.malformed(error.sentence))
             if not self.online:

@@ -6,7 +6,6 @@ Requests of users, a control or status word without a slot in cyclic telegrams, 
 """
 
 from collections.abc import Callable, Generator, Sequence
-from functools import partial
 import math
 
 from drive_can_bridge.core import sentences
@@ -118,7 +117,7 @@ class AcyclicSide:
                 asked = None    # maps as they were before a stall
             words = self._decode(frame, None if asked is None else asked.key)
         except Unasked as error:
-            late = self.channel.late(now, partial(self._answers, frame))
+            late = self.channel.late(now, frame)
             session.report.unasked(sentences.malformed(error.sentence), late, now)
             return
         except RemoteProtocolError as error:
@@ -127,15 +126,6 @@ class AcyclicSide:
         if len(frame.data) != PAYLOAD:
             session.statistics.short += 1
         self.channel.receive(words, now)
-
-    def _answers(self, frame: Frame, step: Step) -> bool:
-        if not isinstance(step, ParameterRead):
-            return False
-        try:
-            self._decode(frame, step.key)
-        except (RemoteProtocolError, Unasked):
-            return False
-        return True
 
     def foreign_master(self, frame: Frame) -> None:
         """Record a request that is not ours."""

@@ -129,8 +129,7 @@ class DataModelStandard(Family):
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         """Return both identifiers of the drive."""
         # one that does not fit is refused as such: it must not look like another one
-        return [Claim(Route(identifier, STANDARD_IDENTIFIER_MAX, False),
-                      f'11-bit identifier {identifier:03X}h')
+        return [Claim(Route.of(identifier), f'11-bit identifier {identifier:03X}h')
                 for identifier in (base + drive.station for base in _bases(drive).values())
                 if 0 <= identifier <= STANDARD_IDENTIFIER_MAX]
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.protocols.datamodel import extended, standard
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
@@ -151,6 +151,6 @@ def standard_prober(drive: DriveConfiguration) -> DataModelProber:
     hazard = '' if request & 1 or request not in _CANNORD_TASKS else (
         frame_sentences.hazard_maps(request))
     return DataModelProber(
-        drive, [Route(request, STANDARD_IDENTIFIER_MAX, False)], question,
+        drive, [Route.of(request)], question,
         lambda data: standard.decode_read_response(Frame(response, data, False), SLOTS),
         hazard=hazard, maps_count=False)

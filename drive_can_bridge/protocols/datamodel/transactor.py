@@ -28,6 +28,7 @@ from dataclasses import dataclass
 import math
 from typing import Protocol, Union
 
+from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.requests import RetryPolicy
@@ -184,6 +185,16 @@ class ParameterTransactor(Transactor[Step, Reply]):
         if self.anonymous:  # a second answer, if there is one, must not meet the next read
             self.free_at = max(self.free_at, now + SPACING)
         return answer
+
+    def answers(self, answer: Frame | None, step: Step) -> bool:
+        """Return whether a frame may answer a step; None: it does not say what it answers."""
+        if answer is None or not isinstance(step, ParameterRead):
+            return answer is None
+        try:
+            self._codec.decode(answer, step.key)
+        except (RemoteProtocolError, Unasked):
+            return False
+        return True
 
     def is_news(self, asked_at: float, now: float) -> bool:
         """Return whether an answer taken now has not waited for a process that stood still."""

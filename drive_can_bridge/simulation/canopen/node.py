@@ -9,7 +9,7 @@ from collections.abc import Callable
 import math
 
 from drive_can_bridge.core.errors import RemoteProtocolError
-from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.sdo import REQUEST_BASE, RESPONSE_BASE
@@ -83,7 +83,7 @@ class CanopenNode(Companion):
     def routes(number: int, *pdos: int) -> list[Route]:
         """Return the identifiers of a node, and that of NMT commands."""
         own = REQUEST_BASE, RESPONSE_BASE, network.HEARTBEAT_BASE, network.EMERGENCY_BASE
-        return [Route(identifier, STANDARD_IDENTIFIER_MAX, False) for identifier in (
+        return [Route.of(identifier) for identifier in (
             network.NMT_IDENTIFIER, *(base + number for base in own), *pdos)]
 
     def power_lost(self, back_at: float) -> None:

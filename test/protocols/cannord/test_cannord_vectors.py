@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
-from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.cannord import identifiers, process_data, states
 from drive_can_bridge.protocols.cannord.identifiers import MessageObject
@@ -44,11 +44,11 @@ def test_addresses_that_do_not_exist(address: int) -> None:
 
 
 def test_routes() -> None:
-    route = identifiers.route(0xC9)
+    route = Route.of(0xC9)
     assert route.matches(Frame(0xC9, b'', False))
     assert not route.matches(Frame(0xC9, b'', True))
     assert not route.matches(Frame(0xC8, b'', False))
-    wide = identifiers.route(0x03240000, extended=True)
+    wide = Route.of(0x03240000, extended=True)
     assert wide.matches(Frame(0x03240000, b'', True))
     assert not wide.matches(Frame(0x03240001, b'', True))
 
