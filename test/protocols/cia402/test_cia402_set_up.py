@@ -566,7 +566,7 @@ class TestNoNmt:
         axis.drive.becomes(axis.drive.ON)
         axis.live(0.3)
         assert axis.session.online
-        assert axis.drive.told == [0x07, 0x06]
+        assert axis.drive.told == [0x07, 0x00, 0x06], 'no SYNC enables it again'
 
 
 class TestHeldAxes:
