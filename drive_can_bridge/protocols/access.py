@@ -82,7 +82,7 @@ class OneByOne(ParameterPlacement[Parameter]):
 
 class SentWrites(Generic[SpanT]):
     """
-    Which of the writes that left are setpoints and control words: what a drive was told last.
+    Which of the writes that left are setpoints and control words: what a drive was commanded last.
 
     :param sent: where that is kept.
     """
@@ -146,7 +146,7 @@ class ParameterAccess(ABC, Generic[SpanT, StepT, ReplyT]):
                          else self._write_all(request), done, now, priority)
 
     def cancel(self) -> None:
-        """Forget all of them; nobody is told."""
+        """Drop all of them without an answer."""
         self.channel.cancel(Priority.USERS)
 
     def known(self, request: Request) -> Outcomes:
@@ -169,7 +169,7 @@ class ParameterAccess(ABC, Generic[SpanT, StepT, ReplyT]):
         raise NotImplementedError
 
     def write_blind(self, items: Sequence[Item]) -> Generator[StepT, ReplyT, Outcomes]:
-        """Write likewise, without waiting for anything that the drive says first."""
+        """Write without reading anything from the drive first."""
         return self.write(items)
 
     def misfit(self, items: Sequence[Item]) -> Sentence:

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What is told by acyclic writes: setpoints and control word, and when each of them is due.
+What is commanded by acyclic writes: setpoints and control word, and when each is due.
 
 A setpoint is written when it changes, and again after ``refresh_interval``. Values are looked at
 when a frame is made, not when it becomes due: the newest one wins.
@@ -53,7 +53,7 @@ class Policy(Protocol):
 
 class Judged(NamedTuple):
     """
-    Nobody acknowledges writes: they are judged by the status that follows.
+    Writes are not acknowledged: they are judged by the status that follows.
 
     :param pulse_spacing: s; a pulse is written as often as it has to leave.
     :param wears: each write wears an EEPROM (or may): only a drive that runs on although it shall
@@ -86,7 +86,7 @@ class Acknowledged:
 
 class AcyclicOutput:
     """
-    What one drive has to be told.
+    The acyclic writes that command one drive.
 
     :param control: the machine of its control word; None: there is none.
     :param count: of what is written on change.
@@ -112,7 +112,7 @@ class AcyclicOutput:
         self.forget()
 
     def forget(self) -> None:
-        """Record that nothing is known of the drive: everything is due at the next look."""
+        """Record that nothing is known of the drive: everything is due with the next poll."""
         self.write_all()
         self._due.clear()
         self.restart()
@@ -153,7 +153,7 @@ class AcyclicOutput:
                 or 0.0 < self._refresh[index] <= now - self._written_at[index] + TOLERANCE)
 
     def last_written(self, index: int) -> int | None:
-        """Return what the drive has, or has been sent; None: nobody knows."""
+        """Return what the drive has, or has been sent; None: unknown."""
         return self._written[index]
 
     def order_word(self, *, first: bool) -> None:
@@ -172,7 +172,7 @@ class AcyclicOutput:
         return self._due.pop(0)
 
     def written(self, index: int, raw: int, now: float) -> None:
-        """Record what goes out (at once: a look meanwhile must not find it due)."""
+        """Record what goes out, at once, so that it is not due any more."""
         self._written[index] = raw
         self._written_at[index] = now
         if index in self._due:
@@ -181,7 +181,7 @@ class AcyclicOutput:
             self.word_begun(raw)
 
     def failed(self, index: int) -> None:
-        """Record that nobody knows what the drive has: it is due at the next look."""
+        """Record that it is unknown what the drive has: the value is due again."""
         self._written[index] = None
 
     def invalidate(self, since: float, *, but: Container[int | None] = ()) -> bool:
@@ -193,7 +193,7 @@ class AcyclicOutput:
         return bool(found)
 
     def write_all(self, *, but: Container[int] = ()) -> None:
-        """Mark everything ``but`` these as due at the next look, whether it has changed or not."""
+        """Mark everything ``but`` these as due, whether it has changed or not."""
         for index in range(len(self._written)):
             if index not in but:
                 self.failed(index)
@@ -218,11 +218,11 @@ class AcyclicOutput:
         return bool(self._lacking)
 
     def restart(self) -> None:
-        """Forget what was written: whether the drive was there to hear it, nobody knows."""
+        """Forget which setpoints the drive has: it may not have received them."""
         self._lacking = None
 
     def has(self, index: int) -> bool:
-        """Record that the drive has a setpoint; tell whether it was the last one waited for."""
+        """Record that the drive has a setpoint; return whether it was the last one waited for."""
         if not self._lacking or index not in self._lacking:
             return False
         self._lacking.discard(index)

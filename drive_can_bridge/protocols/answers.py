@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What one drive answers to the cycles that it is told by, no matter who sends them.
+What one drive answers to the cycles that command it, whichever session sends them.
 
 An answer that does not come in time is missed, and after ``missed_limit`` of those in a row the
 drive is lost. What it answers to cycles of before shows nothing (:mod:`.exchange_book`).
@@ -109,7 +109,7 @@ class CycleAnswers:
             self.in_turn or self.session.stage is Stage.STOPPING)
 
     def _confirm_stop(self) -> None:
-        """Record that the drive has shown to have heard what it was told last, if it has."""
+        """Record an answer that acknowledges what was commanded last, if it does."""
         duty = self.session.duty
         if self.confirms and self.book.stop_shown:
             if self.session.online:

@@ -81,7 +81,7 @@ class Quarantine:
         return self._until[key][0] if key in self._until else -math.inf
 
     def answered(self, key: Hashable) -> None:
-        """Record an answer: to the oldest question of this key, for all anybody knows."""
+        """Record an answer, taken to be that to the oldest question of this key."""
         for entry in self._begun:
             if entry[1] == key:
                 self._begun.remove(entry)
@@ -111,7 +111,7 @@ class Quarantine:
         self._begun = deque((each for each in self._begun if each[1] != key), maxlen=REMEMBERED)
 
     def handle_stall(self, before: float, now: float) -> None:
-        """Listen on where nobody did at the end of a quarantine, or while answers may come."""
+        """Extend each quarantine whose end, or late answers, fell into the stall."""
         self._begun = deque((
             (max(until, now) if before < until + LATE_MAX else until, key)
             for until, key in self._begun), maxlen=REMEMBERED)
@@ -127,7 +127,7 @@ class Quarantine:
 
 
 class Priority(Enum):
-    """Who a procedure works for; the first comes first."""
+    """What a procedure is for; the first comes first."""
 
     STOP = 'what makes the drive stand still'
     CONTROL = 'control word'
@@ -223,7 +223,7 @@ class Channel(Generic[StepT, ReplyT]):
 
     def late(self, received_at: float, answer: Any = None) -> float | None:
         """
-        Record an answer that nobody waits for.
+        Record an answer to nothing that is under way.
 
         :param answer: as :meth:`.Transactor.answers` wants it.
         :return: how many s ago the step was given up that it answers; None: there is none.
@@ -271,7 +271,7 @@ class Channel(Generic[StepT, ReplyT]):
 
     def clear(self) -> None:
         """
-        Forget everything under way. Nobody is told: that is the caller's business.
+        Forget everything under way, without results: the caller reports that.
 
         An answer may still be on its way. It must not meet the next question, and is no surprise.
         """
@@ -310,7 +310,7 @@ class Channel(Generic[StepT, ReplyT]):
 
     def receive(self, answer: Any, now: float) -> bool:
         """
-        Handle an answer, in the form that the transactor wants; False: nobody asked for it.
+        Handle an answer, in the form that the transactor wants; False: it is unasked.
 
         :raises RemoteProtocolError: malformed, or not the answer to what is under way.
         """
@@ -331,16 +331,16 @@ class Channel(Generic[StepT, ReplyT]):
         return True
 
     def disturbed(self, now: float) -> None:
-        """Record an answer that nobody asked for: more may follow."""
+        """Record an unasked answer: more may follow."""
         self._quarantine.begin(ANYTHING, now + self._transactor.silence)
 
     def wake(self, now: float) -> None:
-        """Look at everything: there is something new."""
+        """Advance, with everything checked: there is something new."""
         self._awake = True
         self.advance(now)
 
     def handle_stall(self, now: float) -> None:
-        """Record that nobody listened until now: an answer may lie in some buffer."""
+        """Record a stall until now: an answer may lie in some buffer."""
         self._quarantine.handle_stall(self.now, now)
         self.now = now
         if self._transactor.busy:

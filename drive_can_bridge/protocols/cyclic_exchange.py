@@ -40,7 +40,7 @@ TelegramT = TypeVar('TelegramT')
 
 
 class CycleSender(Protocol[TelegramT]):
-    """What a family says about its cycles: its session, or that of several."""
+    """What a family does for its cycles: its session, or that of a group."""
 
     def encode_cycle(self, raws: list[int]) -> TelegramT:
         """
@@ -82,7 +82,7 @@ class Ending(Enum):
 
 class CyclicExchange(Generic[TelegramT]):
     """
-    The cycles that tell one drive, or several at once.
+    The cycles that command one drive, or several at once.
 
     :param answers: of that drive, or of the one whose session has the setpoints.
     :param slot: of the control word; None: it is not sent cyclically.
@@ -222,7 +222,7 @@ class CyclicExchange(Generic[TelegramT]):
             self.timer.hurry(now)
 
     def hand_out_neutral(self, now: float) -> None:
-        """Bring the next cycle forward: only its answer shows that the drive was told to stop."""
+        """Bring the next cycle forward: only its answer acknowledges the stop."""
         self._answers.book.invalidate()
         self.timer.hurry(now)
 
@@ -246,7 +246,7 @@ class CyclicExchange(Generic[TelegramT]):
         self._answers.expect(now, until, runs=self.runs)
 
     def await_frame(self) -> Left:
-        """Count a frame to the cycle that somebody else hands out, and tells what became of."""
+        """Count a frame that another object sends; return what to call when it has left."""
         self._frames_out += 1
         return self._alone_left
 
@@ -331,7 +331,7 @@ class CyclicExchange(Generic[TelegramT]):
         self.cycles_left, self._ending = cycles_left, None
 
     def _last_left(self, now: float) -> None:
-        """Come to an end, at once or when somebody has answered."""
+        """End the stop, at once or when a drive has answered."""
         if self._ending and self._unacknowledged:
             self._ending = Ending.WAITING_LONGER if self.sending_more else Ending.WAITING
             self.timer.start(now + LAST_ANSWER)
@@ -366,11 +366,11 @@ class CyclicExchange(Generic[TelegramT]):
 
     @property
     def _unacknowledged(self) -> bool:
-        """Whether somebody who ran has not shown to have heard one of the last cycles."""
+        """Whether a drive that ran has not acknowledged any of the last cycles."""
         return any(each.session.unacknowledged for each in self.audience)
 
     def mark_silent(self) -> None:
-        """Record who ran, and has answered none of the last cycles."""
+        """Record which drives ran and have answered none of the last cycles."""
         for each in self.audience:
             if each.session.unacknowledged:
                 each.session.duty.happened(Happened.SILENT)

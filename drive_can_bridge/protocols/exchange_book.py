@@ -204,7 +204,7 @@ class ExchangeBook:
         return now < self._since + 0.5 * self._period
 
     def invalidate(self) -> None:
-        """Record that no cycle up to now shows that the drive was told to stop."""
+        """Record that answers to cycles up to now acknowledge no stop."""
         self._runs += 1
         self.stop_shown = False
 
@@ -230,7 +230,7 @@ class ExchangeBook:
 
     def late(self, received_at: float) -> float | None:
         """
-        Record an answer that nobody waits for.
+        Record an answer that no cycle waits for.
 
         :return: by how many s answers are late: this one, or that before it, which was taken for
             that to a later cycle; 0: it is in time, but not wanted any more; None: no cycle is
@@ -288,7 +288,7 @@ class ExchangeBook:
         statistics.latency.add(latency if latency > 0.0 else 0.0)
 
     def missed(self) -> bool:
-        """Record an exchange that nobody answered; tell whether those were too many."""
+        """Record an unanswered exchange; return whether there were too many in a row."""
         self.awaiting = False
         self._statistics.missed += 1
         self.missed_in_row += 1
@@ -299,7 +299,7 @@ class ExchangeBook:
         self.awaiting = False
 
     def take_stale(self) -> bool:
-        """Count a frame that nobody waits for; return whether it may come beside the answers."""
+        """Count a frame that no cycle waits for; return whether it may come beside the answers."""
         if not self.stale:
             return False
         self.stale -= 1

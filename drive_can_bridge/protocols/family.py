@@ -125,7 +125,7 @@ class Claim(NamedTuple):
                 and not (self.shared and self.shared == other.shared))
 
     def rivals(self, other: 'Claim') -> bool:
-        """Return whether drives of the other hear this, too, where two exchanges send them."""
+        """Return whether two exchanges would send broadcasts that the drives of both obey."""
         return (self.once and other.once and self.shared == other.shared
                 and self.route.extended == other.route.extended)
 
@@ -178,7 +178,7 @@ class ModeKey(NamedTuple):
 
 
 class FamilyParts(NamedTuple):
-    """What makes those who talk to the drives of a family, or listen to them."""
+    """Makes session, observer, scanner and prober of a family."""
 
     session: Callable[[DriveConfiguration], Session]
     observer: Callable[[DriveConfiguration, Emit], DriveObserver]
@@ -274,7 +274,7 @@ class Family(ABC):
 
     def overheard(self, drive: DriveConfiguration) -> list[Route]:
         """
-        Return identifiers, each alone, on which another master may tell several drives at once.
+        Return identifiers, each alone, on which another master may command several drives.
 
         The drive may obey, so that its session hears what others send there; no drive claims them.
         """
@@ -319,7 +319,7 @@ class Family(ABC):
 
     def enabled_status(self, drive: DriveConfiguration,
                       ) -> tuple[Parameter, Callable[[int], bool]] | None:
-        """Return what can be read to see whether a drive is enabled, and what it says then."""
+        """Return the parameter that shows whether a drive is enabled, and a test of it."""
         control = drive.profile.control
         status = control and control.status_parameter and drive.profile.parameters.get(
             control.status_parameter)
@@ -343,7 +343,7 @@ class Family(ABC):
 
     @abstractmethod
     def parts(self) -> FamilyParts:
-        """Import who talks and listens to drives: checks of a configuration need none of it."""
+        """Import session, observer, scanner, prober: checks of a configuration need none."""
 
     def make_session(self, drive: DriveConfiguration) -> Session:
         """Make the session of a drive that is alone. Nothing is sent before ``activate``."""
@@ -365,7 +365,7 @@ class Family(ABC):
         return [self.parts().observer(drive, emit) for drive in drives]
 
     def make_scanner(self) -> Scanner:
-        """Make what looks for drives of this family on a bus that nobody has described."""
+        """Make the scanner for drives of this family on a bus without a parameter file."""
         return self.parts().scanner()
 
     def make_prober(self, drive: DriveConfiguration) -> Prober:

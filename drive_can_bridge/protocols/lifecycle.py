@@ -45,7 +45,7 @@ class Lifecycle:
         self._go_on(script, None, now)
 
     def end(self) -> None:
-        """End it where it stands; nobody is told what it has asked for."""
+        """End it where it stands, without the results that it waits for."""
         self._script, self.due, self._next = None, math.inf, None
 
     def stop(self) -> None:

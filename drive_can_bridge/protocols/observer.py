@@ -169,7 +169,7 @@ class DriveObserver:
 
     def decoded(self, decode: Callable[[bytes], T], data: bytes, now: float,
                 direction: Direction, kind: TelegramKind, title: str) -> T | None:
-        """Return what data mean to ``decode``; None: nothing, which was told."""
+        """Return what data mean to ``decode``; None: nothing, which was reported."""
         try:
             return decode(data)
         except (RemoteProtocolError, ValueError) as error:  # ValueError: of an enum

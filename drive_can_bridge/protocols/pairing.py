@@ -75,7 +75,7 @@ class CyclicWatch:
         return self._asked == self._asked   # not NaN
 
     def answer(self, now: float) -> tuple[Verdict, float]:
-        """Count an answer; return what it is, and s since the request (NaN: nobody asked)."""
+        """Count an answer; return what it is, and s since the request (NaN: there was none)."""
         asked = self._asked
         if asked == asked:      # not NaN
             self._asked = math.nan

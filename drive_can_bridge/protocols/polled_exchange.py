@@ -91,7 +91,7 @@ Raws = Sequence[int | None]
 
 
 class Polled(Protocol):
-    """What a family says about its rounds; the session itself."""
+    """What a family does for its rounds: its session."""
 
     @property
     def present(self) -> bool:
@@ -153,7 +153,7 @@ class PolledExchange:
         self._book.missed_in_row = 0
 
     def disregard(self) -> None:
-        """Record that the round under way, if any, says nothing."""
+        """Record that the round under way, if any, does not count."""
         self._void = self.reading
 
     def cancel(self) -> None:

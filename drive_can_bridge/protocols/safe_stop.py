@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The stop of a drive by acyclic writes, whatever its family: what has to be told, and what follows.
+The stop of a drive by acyclic writes, whatever its family: which writes, and what follows.
 
 How that is written and confirmed, and how often it is tried, is a procedure of the family, of the
 first priority. At the end of the bridge, a drive that has confirmed it is asked once for its
@@ -70,7 +70,7 @@ def write_until_answered(
 
 
 class _Kind(NamedTuple):
-    """What a stop is about, as it was when it began; ``whole``: all that can be told is in it."""
+    """What a stop is about, as it was when it began; ``whole``: all setpoints are in it."""
 
     stop_pending: bool
     always_report: bool
@@ -110,7 +110,7 @@ class SafeStop(Generic[StepT, ReplyT]):
 
     def writes(self, *, word: bool = True, setpoints: bool = True) -> list[StopWrite]:
         """
-        Return what the drive has to be told: ``disable``, then neutral setpoints.
+        Return what has to be written: ``disable``, then neutral setpoints.
 
         But no position where the axis may not be any more, and no limit.
 
@@ -204,7 +204,7 @@ PAUSE_MAX = 60.0
 
 class StopAgain:
     """
-    The stops of one drive that are told again until it has confirmed one.
+    The stops of an offline drive, written again until it has confirmed one.
 
     :param stop: what is told.
     :param tell: begins it.

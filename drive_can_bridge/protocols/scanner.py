@@ -122,7 +122,7 @@ class Scanner(ABC):
                 fits: Callable[[bytes], bool] = lambda request: True, *,
                 service: int = 0, certainty: Certainty = Certainty.LIKELY) -> bool:
         """
-        Note a frame of a station if it follows a request that it fits to; tell whether it does.
+        Note a frame of a station if it follows a request that it fits to; return whether it does.
 
         An answer to a question that is not our own may be chance: it takes two. One that nobody
         but the station asked can give, to a question of ours, may take its time.
@@ -167,7 +167,7 @@ class Question(NamedTuple):
 
 class Finding(NamedTuple):
     """
-    A key of the drive that was looked at.
+    What was found out about a key of the drive.
 
     :param value: what it should be; None: undecided.
     :param reason: which bytes that rests on, or what is missing.

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 class Storing(NamedTuple):
     """
-    How a drive is told to keep what was written.
+    How a drive is made to store what was written.
 
     :ivar text: what becomes of it without, up to the command.
     :ivar word: what is written then, behind ``drive_can write DRIVE``.

@@ -18,7 +18,7 @@ from typing import Any
 
 
 class Direction(Enum):
-    """Who speaks; the value is what a line of text shows."""
+    """The sender of a telegram; the value is what a line of text shows."""
 
     REQUEST = '>'
     RESPONSE = '<'

@@ -51,7 +51,7 @@ class Refused:
 
     @property
     def absent(self) -> bool:
-        """The drive says that it has no such object."""
+        """The drive reports that it has no such object."""
         return self.failure.kind is FailureKind.ABSENT
 
     @property
@@ -63,7 +63,7 @@ class Refused:
 @dataclass(frozen=True)
 class Silence:
     """
-    Nobody answered.
+    No answer came.
 
     :param sent: False: it was not even sent.
     :param refused: the bus did not take it.
@@ -160,7 +160,7 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
         """Return how often a step is done until it counts as unanswered."""
 
     def unanswered(self, step: StepT, reply: ReplyT) -> bool:
-        """Return whether a reply says that nobody answered, and a late answer may come."""
+        """Return whether a reply is no answer, and a late one may come."""
         return isinstance(reply, Silence) and reply.sent
 
     def again(self, step: StepT) -> bool:
@@ -215,7 +215,7 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
 
     def handle_stall(self, now: float) -> ReplyT | bool:
         """
-        Record that nobody listened until now.
+        Record a stall until now.
 
         :return: the reply that ends the exchange under way; False: none does.
         """

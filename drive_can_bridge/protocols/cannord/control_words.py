@@ -62,7 +62,7 @@ def make_control(*, parameter_set: int, timeout: float,
 
 
 def hint(status: int) -> Sentence:
-    """Return why an inverter does not go on, by its status word; '': it does not say."""
+    """Return why an inverter does not go on, by its status word; '': unknown."""
     if is_faulted(status):
         return NOTHING
     if not status & _VOLTAGE_ENABLED:

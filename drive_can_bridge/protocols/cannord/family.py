@@ -107,7 +107,7 @@ class Cannord(Family):
         return [found[drive.name] for drive in drives]
 
     def raw_parameter(self, drive: DriveConfiguration, name: str) -> Parameter | None:
-        """Resolve ``p<number>`` and ``p<number>.<sub-index>``; the drive tells the width."""
+        """Resolve ``p<number>`` and ``p<number>.<sub-index>``; the drive has the width."""
         match = _RAW_NAME.fullmatch(name)
         if match is None:
             return None
@@ -160,7 +160,7 @@ class Cannord(Family):
 
     def _check_kinds(self, drives: Sequence[DriveConfiguration],
                      ) -> Iterator[tuple[DriveConfiguration, Complaint]]:
-        """Look for both kinds of broadcast on one bus: all who listen, listen to both."""
+        """Yield drives of both kinds of broadcast on one bus: inverters obey both."""
         everyone = [drive for drive in drives if drive.options.broadcast != 'none']
         for drive in everyone[1:]:
             mine = drive.options.broadcast

@@ -55,7 +55,7 @@ class GroupMember:
 
 class Group:
     """
-    What is told to all inverters of a group, and what becomes of it.
+    What all inverters of a group are commanded, and what becomes of it.
 
     :param drives: the leader first, as it joins first.
     :ivar exchange: the cycles of all; the answers of the leader.
@@ -236,7 +236,7 @@ class Group:
         return sentences.sent_by_group(parameter.name, self.leads)
 
     def facts(self, session: Session) -> dict[str, str]:
-        """Return who leads whom, for diagnostics."""
+        """Return leader and members of the group, for diagnostics."""
         if self.alone:
             return {}
         if session is not self._leader:

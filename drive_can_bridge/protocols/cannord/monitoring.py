@@ -78,13 +78,13 @@ class TimeoutWatch:
         self._told = NOTHING
 
     def poll(self, now: float) -> None:
-        """Read it, unless that is under way, or nobody answered lately."""
+        """Read it, unless a read is under way or was unanswered lately."""
         if self._parameter is not None and now >= self._ask_at and (
                 self._access.channel.is_idle(Priority.OWN)):
             self._access.serve(ReadRequest((self._parameter,)), self._take, now, Priority.OWN)
 
     def request_answered(self, request: Request, outcomes: Outcomes) -> None:
-        """Look again when somebody has written it."""
+        """Read it again after a user has written it."""
         if isinstance(request, WriteRequest) and any(
                 parameter.number == TIMEOUT_NUMBER and isinstance(outcome, Written)
                 for (parameter, _), outcome in zip(request.items, outcomes)):

@@ -110,7 +110,7 @@ class CannordObserver(DriveObserver):
                       verdict=verdict, remark=remark)
 
     def _main(self, data: bytes, now: float, direction: Direction, title: str) -> list[int]:
-        """Return what a main frame holds; nothing: it is an extra one, or malformed, and told."""
+        """Return the content of a main frame; []: an extra one, or malformed (reported)."""
         main, extra = self._parameters[direction]
         if len(data) == EXTRA_LENGTH:
             self.report(now, direction, _CYCLIC, title, extra, raws_of(extra, decode_extra(data)))

@@ -85,7 +85,7 @@ _TABLE = (
 
 
 def state_of(status: int) -> InverterState:
-    """Return the state that a status word tells."""
+    """Return the state in a status word."""
     for mask, value, state in _TABLE:
         if status & mask == value:
             return state

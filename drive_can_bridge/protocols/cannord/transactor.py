@@ -55,7 +55,7 @@ Reply = Union[Answered[ParameterFrame], Refused, Silence]
 
 class TaskTransactor(Transactor[ParameterTask, Reply]):
     """
-    Hands tasks to the inverter, and tells which response belongs to them.
+    Sends tasks to the inverter, and matches responses to them.
 
     :param layout: where the fields of a frame are.
     :param outbox: takes the frames.

@@ -15,7 +15,7 @@ _RAW_OBJECT = re.compile(r'x([0-9a-fA-F]{1,4})\.([0-9a-fA-F]{1,2})', re.ASCII)
 
 @dataclass(frozen=True, slots=True)
 class NodeOptions:
-    """Who looks after the node."""
+    """NMT and supervision of the node."""
 
     nmt_start: bool = option(
         True, 'Send NMT start to the node at start, after its boot-up frame, when its heartbeat '
@@ -78,7 +78,7 @@ def _claims(purposes: Mapping[int, str], *, shared: str = '', heard: bool = True
 
 def object_of_name(name: str) -> tuple[int, int] | None:
     """
-    Return index and sub-index that a raw parameter name says; None: it is no object's.
+    Return index and sub-index in a raw parameter name; None: it is no name of an object.
 
     >>> '%04X.%02X' % object_of_name('x2004.10')
     '2004.10'

@@ -45,7 +45,7 @@ INTERVAL_MAX = 65.535
 
 
 class NodeChange(Enum):
-    """What a frame or the passage of time says of a node."""
+    """What a frame, or the passage of time, changes about a node."""
 
     NONE = 'nothing new'
     RESTARTED = 'boot-up'
@@ -88,7 +88,7 @@ class WatchedNode:
         self._blocked_until = -math.inf         # a heartbeat is believed until then
 
     def begin(self, now: float) -> None:
-        """Begin to use the node; what was heard of it before still counts."""
+        """Begin to use the node; what was received from it before still counts."""
         self.free_at = self._blocked_until if self._blocked(now) else now
         self.heartbeats_begin(now)      # none was due while nobody listened
 
@@ -186,12 +186,12 @@ class WatchedNode:
         return sentences.node_state(self.state.text)
 
     def said(self, now: float) -> NmtState | None:
-        """Return the state that its last heartbeat says; None: there is none that is recent."""
+        """Return the state in its last heartbeat; None: none is recent."""
         recent = now - self._said_at <= (self.heartbeat_timeout or BELIEF_TIME)
         return self.state if recent else None
 
     def said_since(self, at: float) -> NmtState | None:
-        """Return the state that a heartbeat has said since then; None: there was none."""
+        """Return the state in a heartbeat since then; None: there was none."""
         return self.state if self._said_at > at else None
 
     @property
@@ -201,7 +201,7 @@ class WatchedNode:
 
     @property
     def ailing(self) -> Sentence:
-        """What the node says of its errors, and what to do; '' if nothing."""
+        """The emergency that the node reports, and what to do; '' if none."""
         emergency = self.emergency
         return NOTHING if emergency is None else sentences.emergency_lasts(emergency.text)
 
@@ -226,7 +226,7 @@ class WatchedNode:
     # -- inside -----------------------------------------------------------------------------------
 
     def _blocked(self, now: float) -> bool:
-        """Return whether a heartbeat that is still believed says that the node takes no PDOs."""
+        """Return whether a recent heartbeat reports a state in which the node takes no PDOs."""
         return now < self._blocked_until
 
     @property

@@ -58,7 +58,7 @@ def listen_to_node(observer: DriveObserver, node: int, booted: Callable[[], None
 
 class NmtObserver(DriveObserver):
     """
-    Watches what is said to all nodes of a bus.
+    Watches NMT commands, which are for all nodes of a bus.
 
     :param nodes: names of the configured drives by node-ID.
     """

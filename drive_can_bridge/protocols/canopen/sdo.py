@@ -100,7 +100,7 @@ _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
 
 
 class SdoCommand(Enum):
-    """What a client asks for, and what a server says; an abort may answer everything."""
+    """Requests of a client and responses of a server; an abort may answer everything."""
 
     UPLOAD = TelegramType(_REQUEST, 0x40, 0xE0, '<BHB4x', 'head index subindex',
                           'UPLOADED UPLOAD_BEGUN')
@@ -157,7 +157,7 @@ class Uploaded(NamedTuple):
 
 
 def encode(message: SdoMessage) -> bytes:
-    """Encode a request or a response; the length of data is told."""
+    """Encode a request or a response, with the length of its data."""
     kind, place, data, number, toggle, last = message
     row = kind.value
     head = row.code | toggle

@@ -125,7 +125,7 @@ class CanopenPkw(Family):
 
     def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
                        ) -> list[DriveObserver]:
-        """Make what watches devices, and what is said to all nodes."""
+        """Make the observers of the devices, and of NMT."""
         from drive_can_bridge.protocols.canopen.observer import NmtObserver
         return [*super().make_observers(drives, emit),
                 NmtObserver({drive.station: drive.name for drive in drives}, emit)]

@@ -87,7 +87,7 @@ class PkwObserver(DriveObserver):
 
     def _meant(self, message: PkwMessage, now: float, direction: Direction,
                title: str) -> RequestContent | None:
-        """Return what a message is about; None: its function does not exist, which was told."""
+        """Return what a message is about; None: unknown function (reported)."""
         meaning = message.meaning
         if meaning is None:
             self.report(now, direction, _PARAMETER, title, verdict=Verdict.MALFORMED,

@@ -88,7 +88,7 @@ class PkwProber(Prober):
         return findings
 
     def _mapped(self) -> Asking[int | None]:
-        """Return the object that the receive PDO4 maps; None: the node does not tell."""
+        """Return the object that the receive PDO4 maps; None: not readable."""
         node = self.drive.station
         if self.drive.options.request_cob_id != network.REQUEST_BASE + node:
             return None     # some other PDO
@@ -167,7 +167,7 @@ class PkwProber(Prober):
 
 
 def harmless(data: bytes) -> bool:
-    """Return whether a request writes nothing, whatever the layout of who gets it."""
+    """Return whether a request writes nothing in any layout."""
     meanings = [pkw.decode(data, layout).meaning for layout in PkwLayout]
     return not any(meaning is not None and meaning.writes for meaning in meanings)
 

@@ -78,7 +78,7 @@ class RegisterAccess(ParameterAccess[Span, Step, Reply]):
 def command(duty: StopDuty, channel: Hashable, write: RegisterWrite, *, runs: bool,
          ) -> Procedure[Reply]:
     """
-    Write a setpoint or control word, and keep the books of what the drive was told.
+    Write a setpoint or control word, and record what the drive was commanded.
 
     What may start it counts from now on, what stops it when it is answered: whether a write
     without an answer was executed, nobody knows. One that was not sent changes nothing.

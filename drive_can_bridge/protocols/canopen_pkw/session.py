@@ -265,7 +265,7 @@ class PkwSession(Session):
         return True
 
     def _stop_if_owed(self, now: float) -> None:
-        """Stop a drive of which nobody knows whether it listens, if its stop is pending."""
+        """Stop a drive whose stop is pending, although it may not receive anything."""
         if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._writers.stop(now)
 

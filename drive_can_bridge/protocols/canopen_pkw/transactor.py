@@ -297,7 +297,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
             step.address in self._disbelieved or any(id(each) in asked for each in late))
 
     def _ask_aside(self, step: Step, now: float) -> None:
-        """Read what nobody has asked for, if there is something, before the step."""
+        """Read a register that no request has asked for, if there is one, before the step."""
         asked = {request.word for request in self._asked}
         word = next((word for word in ASIDE if word not in asked), None)
         if word is None:

@@ -151,7 +151,7 @@ class Writers:
         self._made_room = False
 
     def _stops(self, index: int, setpoint: Setpoint) -> bool:
-        """Return whether a setpoint, as it is now, takes back what the drive was told."""
+        """Return whether a setpoint, as it is now, takes back what was commanded."""
         return (setpoint.raw == setpoint.neutral and setpoint not in self._setpoints.held
                 and self._session.duty.runs(index))
 
@@ -173,7 +173,7 @@ class Writers:
                 yield from self._write_setpoint(index)
 
     def _write_setpoint(self, index: int) -> Procedure[bool]:
-        """Write one as it is then; tell whether it was neutral."""
+        """Write one as it is then; return whether it was neutral."""
         setpoint = self._setpoints.items[index]
         raw, reply = yield from self._command_setpoint(index, setpoint)
         neutral = raw == setpoint.neutral and not setpoint.parameter.limit
@@ -266,7 +266,7 @@ class Writers:
                 self._write_word(parameter, control), lambda _: None, now, Priority.CONTROL)
 
     def _write_word(self, parameter: Parameter, control: ControlMachine) -> Procedure[None]:
-        """Write the newest word, until it is answered or silence says to wait a while."""
+        """Write the newest word until it is answered, or has to wait after silence."""
         output, unanswered = self._output, 0
         while not output.holds_word():
             word, stopping = control.word, control.stopping
@@ -309,7 +309,7 @@ class Writers:
                 return
 
     def _read_back(self, parameter: Parameter, word: int) -> Procedure[bool | None]:
-        """Return whether the drive has a word that was not answered; None: nobody knows."""
+        """Return whether the drive has a word that was not answered; None: unknown."""
         if not parameter.readable:
             return None
         span = self._placement.span(parameter)
@@ -405,7 +405,7 @@ class ExpiryWatch:
 
     @property
     def due(self) -> float:
-        """When ages are to be looked at; infinity: what is lost, or stopped, has no commands."""
+        """When ages are to be checked; infinity: no commands while lost or stopped."""
         running = self._session.stage is Stage.RUNNING
         return self._session.setpoints.expires_at if running else math.inf
 

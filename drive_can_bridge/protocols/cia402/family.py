@@ -86,7 +86,7 @@ class Cia402(Family):
 
     def check_together(self, drives: Sequence[DriveConfiguration],
                        ) -> Iterator[tuple[DriveConfiguration, Complaint]]:
-        """Yield in what drives of one bus contradict each other: SYNC, and who the bridge is."""
+        """Yield contradictions between drives of one bus: SYNC period, Node-ID of the bridge."""
         in_step = [drive for drive in drives if drive.options.transmission == 'sync']
         for drive in in_step[1:]:
             first = in_step[0]
@@ -147,7 +147,7 @@ class Cia402(Family):
         return {} if free == NODE_MAX else {'bridge_node': free}
 
     def raw_parameter(self, drive: DriveConfiguration, name: str) -> Parameter | None:
-        """Resolve ``x<index>.<sub-index>``; the drive tells the width."""
+        """Resolve ``x<index>.<sub-index>``; the drive has the width."""
         place = object_of_name(name)
         return None if place is None else Parameter(
             name=name, type=ParameterType.UINT32, index=place[0], subindex=place[1], listed=False,
@@ -170,7 +170,7 @@ class Cia402(Family):
 
     def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
                        ) -> list[DriveObserver]:
-        """Make what watches drives, and what is said to all nodes."""
+        """Make the observers of the drives, and of NMT, SYNC and heartbeats."""
         from drive_can_bridge.protocols.cia402.observer import make_observers
         return make_observers(drives, emit)
 

@@ -89,20 +89,20 @@ class LimitCheck:
         return NOTHING
 
     def begin(self) -> None:
-        """Begin to look: exchanges follow."""
+        """Begin to check: exchanges follow."""
         self._polling = None
         for limit in self._limits:
             limit.looked_for, limit.over, limit.otherwise = None, False, NOTHING
         self._open = list(self._limits)
 
     def stop(self) -> None:
-        """Look at nothing any more: the channel was cleared."""
+        """Check nothing any more: the channel was cleared."""
         self._polling = None
         self._open = []
 
     @property
     def otherwise(self) -> Sentence:
-        """Which limits have a third value; '': none, as far as anybody knows."""
+        """Which limits are known to have a third value; '': none."""
         return together(each.otherwise for each in self._limits)
 
     @property
@@ -112,7 +112,7 @@ class LimitCheck:
                      if each.looked_for is None), NOTHING)
 
     def answered(self, now: float) -> None:
-        """Look at what was sent with an exchange that the drive has answered."""
+        """Check what was sent with an exchange that the drive has answered."""
         if not self._open or self._polling is not None:     # all that most cycles pay
             return
         for limit in self._open:

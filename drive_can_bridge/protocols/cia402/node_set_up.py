@@ -130,7 +130,7 @@ class NodeSetUp:
         return SetUpOutcome(SetUpState.READY, status=status)
 
     def _check_again(self) -> Procedure[int]:
-        """Look again at what nobody looked at meanwhile; return the status word."""
+        """Check heartbeats and status again after the set-up; return the status word."""
         while True:
             yield from self._await_heartbeats()
             status = yield from self._stand_still(
@@ -198,7 +198,7 @@ class NodeSetUp:
         return raw
 
     def _stop_blindly(self, attempts: int | None = None) -> Procedure[None]:
-        """Stop a drive whose state nobody knows, before SYNC begins."""
+        """Stop a drive whose state is unknown, before SYNC begins."""
         producer = self._producer
         if producer is not None and not producer.opened and self._stopped_at == math.inf:
             self._stopped_at = self._channel.now
@@ -268,7 +268,7 @@ class NodeSetUp:
                 yield Transfer(pause=POLL_PERIOD)
 
     def _start(self) -> Procedure[None]:
-        """Start the node, or wait until somebody else does."""
+        """Start the node, or wait until another master does."""
         if self._producer is not None:
             yield from self._sync_begins(self._producer)
         if self._options.nmt_start:

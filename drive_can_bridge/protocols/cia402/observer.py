@@ -187,7 +187,7 @@ class Cia402Observer(DriveObserver):
             self._end_transfer(now)
 
     def _add(self, segment: SdoMessage) -> bool:
-        """Keep what a segment holds; tell whether it is the last one."""
+        """Store the content of a segment; return whether it is the last one."""
         # a domain may have megabytes, and no more of it is shown
         self._text = (self._text + segment.data)[:TEXT_MAX]
         self._last = segment.last
@@ -222,7 +222,7 @@ class Cia402Observer(DriveObserver):
 
 class NetworkObserver(DriveObserver):
     """
-    Watches what is said to all drives of a bus: NMT, SYNC, the heartbeat of the bridge.
+    Watches what is for all drives of a bus: NMT, SYNC, the heartbeat of the bridge.
 
     :param observers: of these drives.
     """
@@ -252,6 +252,6 @@ class NetworkObserver(DriveObserver):
 
 
 def make_observers(drives: Sequence[DriveConfiguration], emit: Emit) -> list[DriveObserver]:
-    """Make what watches drives, and what is said to all of them."""
+    """Make the observers of the drives, and of what is for all of them."""
     observers: list[DriveObserver] = [Cia402Observer(drive, emit) for drive in drives]
     return [*observers, NetworkObserver(drives, observers, emit)]

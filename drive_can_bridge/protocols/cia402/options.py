@@ -15,7 +15,7 @@ PROBED = ('mode', 'mapping', 'disable_word', 'bridge_heartbeat')
 
 @dataclass(frozen=True, slots=True)
 class Cia402Options(NodeOptions):
-    """What the drive does, how its PDOs travel, and who watches whom."""
+    """Mode, PDOs, heartbeats and NMT of the drive."""
 
     mode: Literal['csp', 'csv', 'cst', 'pp', 'pv', 'tq', 'vl', 'ip'] = option(
         None, 'Mode of operation, written to 6060h; its setpoint has to be in cyclic_request.')

@@ -31,7 +31,7 @@ _IDENTITY = {1: 'vendor', 2: 'product', 3: 'revision', 4: 'serial number'}
 
 class Cia402Scanner(Scanner):
     """
-    Recognises what nodes answer to anybody's reads of 1000h.
+    Recognises answers to reads of 1000h, whichever master asks.
 
     Reads objects that every node has or refuses. 600h to 67Fh mean nothing to other families.
     """

@@ -265,7 +265,7 @@ class Cia402Session(Session):
             now = yield again
 
     def _stopped_by_nmt(self, now: float) -> bool:
-        """Return whether the node says that it is in the state in which it answers no SDO."""
+        """Return whether the node reports NMT state stopped, in which it answers no SDO."""
         return self._node.said(now) is NmtState.STOPPED
 
     def _start_cycling(self, status: int, now: float) -> None:
@@ -625,7 +625,7 @@ class Cia402Session(Session):
         self._stop.begin(self._see_it_stop(writes, unanswered=unanswered), now, again=again)
 
     def _see_it_stop(self, writes: list[StopWrite], *, unanswered: bool) -> StopProcedure:
-        """Stop it, and in the end look whether it has, as long as frames would go on."""
+        """Stop it, and read its state in the end, for as long as frames would go on."""
         failed = yield from self._sdo_stop.writes(writes, unanswered=unanswered)
         if not failed and self.stage is Stage.STOPPING:
             state = yield from self._state_in_the_end()
@@ -697,7 +697,7 @@ class Cia402Session(Session):
 
     @property
     def needs_sync(self) -> bool:
-        """The drive is looked for, set up, in exchange, or told to stop."""
+        """The drive is looked for, set up, in exchange, or being stopped."""
         return self.stage is Stage.RUNNING or self.stage is Stage.STOPPING and (
             self.exchange.cycling or self._stop.running)
 

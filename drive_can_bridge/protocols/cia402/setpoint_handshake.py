@@ -69,7 +69,7 @@ class SetpointHandshake:
         rules.halted = rules.mode_bits == states.HALT
 
     def disarmed(self, *, acknowledged: bool = False) -> None:
-        """Halt what is on its way, if nobody means its target any more."""
+        """Halt an axis that is on its way, if its setpoint is not armed any more."""
         rules = self._rules
         if self._setpoint.armed:
             return

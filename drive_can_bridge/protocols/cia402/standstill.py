@@ -261,7 +261,7 @@ class Standstill:
     @property
     def untold(self) -> bool:
         """
-        Nothing says whether it stands in its quick stop, and it had its time to.
+        No object reports whether it stands in its quick stop, and its time is over.
 
         That is enough for what users ask for, and says nothing else.
         """

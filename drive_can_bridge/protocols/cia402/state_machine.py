@@ -213,7 +213,7 @@ class DriveRules(TableRules):
 
 
 def hint(status: int) -> Sentence:
-    """Return why a drive does not go on, by its status word; '': it says nothing of that."""
+    """Return why a drive does not go on, by its status word; '': unknown."""
     if status & states.FAULT_BIT or states.state_of(status) in (
             ServoState.OPERATION_ENABLED, ServoState.QUICK_STOP_ACTIVE):
         return NOTHING

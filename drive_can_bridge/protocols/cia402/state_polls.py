@@ -23,7 +23,7 @@ from drive_can_bridge.protocols.transactor import Refused
 
 
 class StatePolls:
-    """The looks at one drive, one at a time."""
+    """The polls of one drive, one at a time."""
 
     def __init__(self, session: Session, control: ControlMachine, rules: DriveRules,
                  channel: SdoChannel, node_set_up: NodeSetUp, homing: Homing) -> None:

@@ -107,7 +107,7 @@ _STATES = {raw: next((state for state, (mask, value) in PATTERNS.items()
 
 
 def state_of(status: int) -> ServoState:
-    """Return the state that a status word tells."""
+    """Return the state in a status word."""
     return _STATES[status & _MASK]
 
 

@@ -18,7 +18,7 @@ OPTIONS = {states.QUICK_STOP_OPTION: ('quick stop', _HOW),
 
 
 def in_words(index: int, value: int) -> str:
-    """Return what an object says that a drive does: ``quick-stop ramp (605Ah = 2)``."""
+    """Return in words what an object makes a drive do: ``quick-stop ramp (605Ah = 2)``."""
     _, meanings = OPTIONS[index]
     return f'{meanings.get(value, "as the manual says")} ({index:04X}h = {value})'
 

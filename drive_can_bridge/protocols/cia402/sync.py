@@ -32,7 +32,7 @@ BEFORE_START, BEHIND_START = 0.1, 0.2
 
 
 class InStep(Protocol):
-    """A session that hears SYNC."""
+    """A session whose drive is synchronised by SYNC."""
 
     outbox: Outbox
     stage: Stage
@@ -43,7 +43,7 @@ class InStep(Protocol):
 
     @property
     def needs_sync(self) -> bool:
-        """The drive is looked for, set up, in exchange, or told to stop."""
+        """The drive is looked for, set up, in exchange, or being stopped."""
 
     @property
     def heard_at(self) -> float:
@@ -55,7 +55,7 @@ class InStep(Protocol):
 
 
 class EventTimer(CycleTimer):
-    """When a drive is due that hears no SYNC: a stop jolts nobody else, and goes out at once."""
+    """When a drive without SYNC is due: its stop jolts no other drive, and goes out at once."""
 
     __slots__ = ()
 

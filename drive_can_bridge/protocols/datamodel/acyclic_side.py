@@ -201,7 +201,7 @@ class AcyclicSide:
 def confirm(writes: Sequence[tuple[Parameter, ParameterWrite]], timeout: float,
             witnesses: Sequence[int]) -> Generator[Step, Words | None, list[Sentence]]:
     """
-    Read back what stops a drive, since nobody acknowledges it, and write it again as needed.
+    Read back what stops a drive, since it is not acknowledged, and write it again as needed.
 
     What cannot be read is written as often as possible. A drive that answers anything behind that
     counts as one that has heard it.
@@ -256,6 +256,6 @@ def _slot(parameters: tuple[Parameter, ...], parameter: Parameter | None) -> int
 
 
 def map_cells(options: DataModelOptions) -> Cells:
-    """Return what tells a drive how cyclic telegrams are to be read: numbers of the profile."""
+    """Return the mapping parameters: numbers of the profile."""
     return frozenset(base + slot for slot in range(SLOTS)
                      for base in (options.request_map_base, options.response_map_base))

@@ -121,7 +121,7 @@ def encode_read_request(station: int, number: int, count: int) -> Frame:
 
 def encode_answer(request: int, words: Sequence[int]) -> Frame:
     """
-    Encode what a drive says to a request, cyclic or not; it repeats the identifier.
+    Encode the response to a request, cyclic or not; it repeats the identifier.
 
     :param request: identifier of the request.
     :raises LocalProtocolError: more than four words, or a word out of range.

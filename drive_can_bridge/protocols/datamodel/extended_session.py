@@ -147,7 +147,7 @@ class ExtendedSession(Session):
     # -- the script of a drive --------------------------------------------------------------------
 
     def _script(self, now: float) -> Script:
-        """Look at the maps, for ever; cycle while they agree."""
+        """Poll the maps, for ever; cycle while they agree."""
         exchange, self._unread = self._exchange, NOTHING
         agreed = differed = False   # what the look before found
         silent_polls = 0            # so many in a row went unanswered
@@ -205,7 +205,7 @@ class ExtendedSession(Session):
         self._start_cycling(now)
 
     def _find_axes(self, until: float) -> Generator[Any, Any, bool]:
-        """Read where axes are that have to stay there; False: it has not said so by then."""
+        """Read the positions that axes have to keep; False: unknown until then."""
         setpoints = self.setpoints
         if not setpoints.known:
             self._exchange.timer.stop()
@@ -262,7 +262,7 @@ class ExtendedSession(Session):
             exchange.run_out(max(now, exchange.timer.began_at + exchange.timer.stop_spacing))
 
     def _make_fit(self, found: str, poll_at: float) -> Generator[Any, Any, float]:
-        """Rewrite maps that differ, if that is wanted, or tell; return when to look again."""
+        """Rewrite maps that differ, or report them, as configured; return when to poll again."""
         if not self._rewrites:
             self._report_difference(sentences.maps_found(found))
             return poll_at

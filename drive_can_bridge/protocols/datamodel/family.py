@@ -40,7 +40,7 @@ def raw_parameter(drive: DriveConfiguration, name: str) -> Parameter | None:
 
 
 def check_period_and_maps(drive: DriveConfiguration) -> Iterator[Complaint]:
-    """Look at how fast the drive is cycled, and at the place of its maps."""
+    """Check how fast the drive is cycled, and the place of its maps."""
     if drive.period < FASTEST_PERIOD and not drive.options.allow_fast_cycle:
         yield Complaint('period', complaints.period_too_fast(
             period=drive.period, least=FASTEST_PERIOD))
@@ -61,7 +61,7 @@ def check_period_and_maps(drive: DriveConfiguration) -> Iterator[Complaint]:
 
 
 def check_parameters(drive: DriveConfiguration, family: str) -> Iterator[Complaint]:
-    """Look at the setpoints, and at every parameter of the profile."""
+    """Check the setpoints, and every parameter of the profile."""
     yield from _check_request(drive)
     yield from _check_profile(drive, family)
 
@@ -201,7 +201,7 @@ class DataModelExtended(Family):
         return [Claim(route, f'29-bit frames of station {drive.station}')]
 
     def bits_per_second(self, drive: DriveConfiguration) -> float:
-        """Return the worst-case load: one exchange a period, and the look at the maps."""
+        """Return the worst-case load: one exchange a period, and the polls of the maps."""
         exchange = 2 * FRAME_BITS / drive.period
         if drive.options.mapping == 'assume':
             return exchange

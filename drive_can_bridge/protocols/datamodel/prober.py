@@ -123,7 +123,7 @@ class DataModelProber(Prober):
 
 
 def extended_prober(drive: DriveConfiguration) -> DataModelProber:
-    """Return who asks a drive with 29-bit identifiers."""
+    """Return the prober of a drive with 29-bit identifiers."""
     station = drive.station << extended.STATION_SHIFT
 
     def question(number: int) -> Question:
@@ -136,7 +136,7 @@ def extended_prober(drive: DriveConfiguration) -> DataModelProber:
 
 def standard_prober(drive: DriveConfiguration) -> DataModelProber:
     """
-    Return who asks a drive with 11-bit identifiers.
+    Return the prober of a drive with 11-bit identifiers.
 
     There is no cyclic telegram: the maps only tell the offset.
     """

@@ -86,7 +86,7 @@ class Put(NamedTuple):
 
 def put(write: ParameterWrite, *, look: bool, verify: bool = True) -> Procedure[Put]:
     """
-    Write words and read them back, since nobody acknowledges writes.
+    Write words and read them back, since writes are not acknowledged.
 
     A write is never repeated: it may be a command, and the read-back tells what became of it.
 
@@ -180,7 +180,7 @@ class Maps(NamedTuple):
 def read_maps(request_base: int, response_base: int, *, needed: tuple[int, ...] | None = None,
               ) -> Procedure[Maps | None]:
     """
-    Read both maps, each in one frame; None when nobody answers.
+    Read both maps, each in one frame; None: no answer.
 
     :param needed: request map of a drive that is being cycled. Any other one ends the look at
         once, because each further cycle would put setpoints into wrong parameters.

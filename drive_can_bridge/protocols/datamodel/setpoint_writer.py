@@ -63,7 +63,7 @@ class ControlByNumber:
         self._watch = Lifecycle(channel)
 
     def begin(self, now: float) -> None:
-        """Handle a drive that was found: it gets its word, and its status is looked at."""
+        """Handle a drive that was found: write its word, and poll its status."""
         self._output.forget_word()
         self._output.restart()
         self._poll(now)
@@ -97,7 +97,7 @@ class ControlByNumber:
 
     @property
     def due(self) -> float:
-        """When the status is to be looked at, or a word to be written again."""
+        """When the status is to be polled, or a word to be written again."""
         poll_at = self._watch.due
         return poll_at if self._word is None else min(poll_at, self._output.again_at)
 

@@ -121,7 +121,7 @@ class StandardSession(Session):
         return min(self._timer.due, self.setpoints.expires_at, super().next_timer())
 
     def _tick(self, now: float) -> None:
-        """Begin a period: look what is to be written, then read."""
+        """Begin a period: write what is due, then read."""
         if self.online:
             self._writer.collect_due(now, unanswered=self._exchange.reading)
             by_number = self._side.control_writer
