@@ -188,6 +188,11 @@ class SteadyClock:
         time.sleep(min(max(0.0, until - self.now()), _LONGEST))
 
 
+def time_of_day(at: float) -> str:
+    """Return a time of the system clock for people, where this process runs: ``14:05:09``."""
+    return time.strftime('%H:%M:%S', time.localtime(at))
+
+
 class Mailbox(Generic[Item]):
     """
     A queue that any thread puts into, and one thread reads, in order.

@@ -23,7 +23,7 @@ from drive_can_bridge.panel.access import PanelRole
 from drive_can_bridge.panel.feed import Feed, stops, View
 from drive_can_bridge.panel.parts import (
     advice, box, button, Changing, class_of, in_script, Look, marked, place_in_words,
-    stop_buttons, Values, words,
+    search_field, stop_buttons, Values, words,
 )
 
 _SPANS = {'30 s': 30, '1 min': 60, '10 min': 600}
@@ -125,10 +125,8 @@ class ParameterTable:
         self._asked: set[str] = set()
         with box('section'):
             with box('row-of'):
-                self._search = ui.input(
-                    placeholder='search name, number, unit, description').classes('search')
-                self._search.props('dense outlined clearable debounce=200')
-                self._search.on_value_change(self._searched)
+                self._search = search_field(
+                    'search name, number, unit, description', self._searched)
                 button_row = box('row-of')
                 self._count = words('', 'dim')
             self._rows = Changing(box('parameters'), self._make_rows)

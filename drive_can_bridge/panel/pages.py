@@ -38,7 +38,7 @@ from drive_can_bridge.panel.drive_page import DrivePage
 from drive_can_bridge.panel.feed import Feed, stops, View
 from drive_can_bridge.panel.parts import (
     advice, Banner, box, button, Changing, class_of, in_script, Look, marked, place_in_words,
-    stop_buttons, Values, words,
+    search_field, stop_buttons, Values, words,
 )
 
 _LINES = 100
@@ -59,9 +59,8 @@ class Overview:
         with self._head:
             self._counts = Changing(box('row-of counts'), self._make_counts)
             box('space')
-            self._filter = ui.input(placeholder='filter: name, state, bus').classes('search')
-            self._filter.props('dense outlined clearable debounce=200')
-            self._filter.on_value_change(lambda: self.show(self._snapshot))
+            self._filter = search_field(
+                'filter: name, state, bus', lambda: self.show(self._snapshot))
         self._troubles = Changing(box('troubles'), _make_troubles)
         self._buses = Changing(box('cards'), lambda names: [_BusCard() for _ in names])
         self._drives = Changing(box('drives'), self._make_drives)
@@ -219,9 +218,7 @@ class LogPage:
             with box('row-of'):
                 words('Log, the newest above', 'title')
                 box('space')
-                self._filter = ui.input(placeholder='filter: words, level').classes('search')
-                self._filter.props('dense outlined clearable debounce=200')
-                self._filter.on_value_change(self._again)
+                self._filter = search_field('filter: words, level', self._again)
                 with box('plain', 'button').props('type=button').on('click', self._pause):
                     self._pausing = ui.label('Pause')
             self._log = box('log')

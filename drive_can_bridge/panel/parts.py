@@ -8,12 +8,12 @@ Text is inserted as text, never as HTML: descriptions and log lines come from an
 from collections.abc import Callable, Sequence
 import json
 import math
-import time
 from typing import Any
 
 from nicegui import ui
 from nicegui.element import Element
 
+from drive_can_bridge.clock import time_of_day
 from drive_can_bridge.core import sentences
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Snapshot, StopAction
 from drive_can_bridge.monitor.summary import silence, Tone
@@ -37,6 +37,14 @@ def marked(element: Element, **marks: str) -> Element:
 def words(text: str = '', classes: str = '') -> ui.label:
     """Create a text element."""
     return ui.label(text).classes(classes)
+
+
+def search_field(placeholder: str, changed: Callable[[], None]) -> ui.input:
+    """Create a field of words that rows are chosen by."""
+    field = ui.input(placeholder=placeholder).classes('search')
+    field.props('dense outlined clearable debounce=200')
+    field.on_value_change(changed)
+    return field
 
 
 class Look:
@@ -123,7 +131,7 @@ class Banner:
 
     def show(self, snapshot: Snapshot) -> None:
         """Show which bridges are silent."""
-        self._lines.of(tuple(silence(snapshot, clock)))
+        self._lines.of(tuple(silence(snapshot, time_of_day)))
 
 
 def advice(drive: DriveSnapshot, snapshot: Snapshot) -> str:
@@ -131,13 +139,8 @@ def advice(drive: DriveSnapshot, snapshot: Snapshot) -> str:
     if drive.silent:
         ago = next((bridge.silent for bridge in snapshot.bridges if bridge.name == drive.bridge),
                    0.0)
-        return sentences.drive_of_silent_bridge(since=clock(snapshot.at - ago))
+        return sentences.drive_of_silent_bridge(since=time_of_day(snapshot.at - ago))
     return '' if drive.level is Level.OK else drive.advice
-
-
-def clock(at: float) -> str:
-    """Return the time of day, where the panel runs."""
-    return time.strftime('%H:%M:%S', time.localtime(at))
 
 
 class Values:

@@ -8,13 +8,12 @@ Also drives that are offline: the text on one, and which are missing a while aft
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import math
-import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from drive_can_bridge.clock import Clock
+from drive_can_bridge.clock import Clock, time_of_day
 from drive_can_bridge.core import bus_sentences, sentences
 from drive_can_bridge.core.events import DriveState
 from drive_can_bridge.core.frame import STUFFING
@@ -52,7 +51,7 @@ def absence(drive: DriveNode) -> Sentence:
     answers = what.kind is sentences.Absence.ANSWERS
     if not session.ever_online:
         return (sentences.not_online if answers else sentences.never_seen)(what)
-    since = time.strftime('%H:%M:%S', time.localtime(drive.lost_at // 1_000_000_000))
+    since = time_of_day(drive.lost_at // 1_000_000_000)
     if answers:
         return sentences.offline_since(since, what)
     # what to correct at a first start, this one has behind it

@@ -29,13 +29,13 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from drive_can_bridge.clock import Clock
+from drive_can_bridge.clock import Clock, time_of_day
 from drive_can_bridge.core.text import counted
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, ModelSource, Snapshot, Times
 from drive_can_bridge.monitor.summary import in_order, silence, Tone, tone_of
 from drive_can_bridge.view.parts import (
-    advice_lines, bus_lines, clock, DIM, drives_table, flow, lamps, Lines, log_lines, milliseconds,
+    advice_lines, bus_lines, DIM, drives_table, flow, lamps, Lines, log_lines, milliseconds,
     section, state, TONE_STYLES, ValueColumns, wrapped)
 
 
@@ -291,7 +291,7 @@ def page(snapshot: Snapshot, choice: Choice, setting: ViewSetting, *, width: int
     choice = choice.among([drive.name for drive in in_order(snapshot.drives)])
     frame = _Frame(width, height - 1)
     frame.bare(_header(snapshot, setting, width))
-    for text in silence(snapshot, clock):
+    for text in silence(snapshot, time_of_day):
         frame.lines(wrapped(text, width, 'bold white on red'))
     drive = snapshot.drive(choice.drive or '')
     if choice.page is Page.HELP:
@@ -344,7 +344,7 @@ def closely(choice: Choice) -> str | None:
 def _header(snapshot: Snapshot, setting: ViewSetting, width: int) -> Text:
     header = Text(setting.title, style='bold', no_wrap=True)
     bridges, drives = len(snapshot.bridges), len(snapshot.drives)
-    right = clock(snapshot.at)
+    right = time_of_day(snapshot.at)
     who = (f'{counted(drives, "drive")}, {counted(bridges, "bridge")}'
            if bridges else 'no bridge yet')
     namespace = f'below {setting.namespace}' if setting.namespace else ''

@@ -9,7 +9,6 @@ moment: a column that moves cannot be read.
 from collections.abc import Iterable, Mapping, Sequence
 import math
 import textwrap
-import time
 
 from rich import box
 from rich.console import Group, RenderableType
@@ -17,6 +16,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from drive_can_bridge.clock import time_of_day
 from drive_can_bridge.monitor.snapshot import (
     BusSnapshot, columns, DriveSnapshot, Level, LogLine, Points, Shown, Snapshot, Times, UNKNOWN,
 )
@@ -169,17 +169,12 @@ def log_lines(log: Sequence[LogLine], width: int, height: int) -> Lines:
 
 
 def _log_entry(entry: LogLine, width: int) -> Lines:
-    start = Text(f'{clock(entry.at)} ', style=DIM)
+    start = Text(f'{time_of_day(entry.at)} ', style=DIM)
     if entry.level in _LOG_STYLES:
         start.append(f'{entry.level} ', style=_LOG_STYLES[entry.level])
     indent = start.cell_len
     first, *others = textwrap.wrap(entry.text, max(20, width - indent)) or ['']
     return [start.append(first), *(Text(' ' * indent + text) for text in others)]
-
-
-def clock(at: float) -> str:
-    """Return the time of day, where the reader is."""
-    return time.strftime('%H:%M:%S', time.localtime(at))
 
 
 def drives_table(drives: Sequence[DriveSnapshot], marked: str | None, *, width: int, height: int,

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from drive_can_bridge.clock import time_of_day
 from drive_can_bridge.monitor.snapshot import (
     BridgeSnapshot, DriveSnapshot, Level, LogLine, Place, Snapshot,
 )
@@ -104,11 +105,10 @@ def test_stops_of_a_silent_bridge_are_there(page: Any, count: int, kind: str) ->
 
 @pytest.mark.parametrize(('count', 'kind'), [(2, 'advice'), (7, 'why')])
 def test_what_is_grey_says_why(page: Any, count: int, kind: str) -> None:
-    from drive_can_bridge.panel.parts import clock
     made = overview(seen(*['online'] * count))
     assert not any('silent' in text for text in texts(page, kind))
     made.show(seen(*['online'] * count, silent=True))
-    assert texts(page, kind) == [f'its bridge is silent since {clock(993.0)}'] * count
+    assert texts(page, kind) == [f'its bridge is silent since {time_of_day(993.0)}'] * count
     made.show(seen(*['online'] * count))
     assert not any('silent' in text for text in texts(page, kind))
 
@@ -140,12 +140,12 @@ def test_bits_that_no_descriptor_numbers_are_known_of_the_family(page: Any) -> N
 
 
 def test_the_banner_says_so_once(page: Any) -> None:
-    from drive_can_bridge.panel.parts import Banner, clock
+    from drive_can_bridge.panel.parts import Banner
     banner = Banner()
     snapshot = seen('online', 'online', silent=True)
     banner.show(snapshot)
     text, = texts(page, 'banner')
-    assert [text] == list(silence(snapshot, clock))
+    assert [text] == list(silence(snapshot, time_of_day))
     banner.show(seen('online', 'online'))
     assert texts(page, 'banner') == []
 
