@@ -430,7 +430,7 @@ def test_no_session_uses_anything_private_of_what_all_share() -> None:
 # -- the stop duty --------------------------------------------------------------------------------
 
 
-def test_whether_a_stop_is_owed_is_asked_of_the_session_only() -> None:
+def test_whether_a_stop_is_pending_is_asked_of_the_session_only() -> None:
     # everybody else says what happened, and carries out what comes back; `runs`: what a writer
     # has told last itself
     inside = {'core/session.py', 'core/stop_duty.py'}

@@ -245,14 +245,14 @@ class Session(ABC):
         self.active = False
         if not self.online and not self.stopped:    # what ended before has been judged
             self.duty.happened(Happened.SILENT)
-        owes = self.prepare_stop(now)
-        if owes:
+        pending = self.prepare_stop(now)
+        if pending:
             self.stage = Stage.STOPPING
         self.services.fail_all(Failure(FailureKind.UNAVAILABLE, reason))
         self.withdraw(reason, now)
-        if owes and self.begin_stop(now):
+        if pending and self.begin_stop(now):
             return
-        self._leave_owing(sentences.stop_not_possible())
+        self._warn_if_running(sentences.stop_not_possible())
         self.go_idle()
 
     def stop_left(self, why: Sentence = NOTHING) -> None:
@@ -261,7 +261,7 @@ class Session(ABC):
 
         :param why: what is wrong with it; by default, that it is not acknowledged.
         """
-        self._leave_owing(why or sentences.stop_not_answered())
+        self._warn_if_running(why or sentences.stop_not_answered())
         self.go_idle()
 
     def stop_ended(self) -> None:
@@ -296,12 +296,12 @@ class Session(ABC):
         self.lose(down, now)
         self.go_idle(down)
         self.outbox.clear()
-        self._leave_owing(sentences.bus_lost_before_stop())
+        self._warn_if_running(sentences.bus_lost_before_stop())
 
     def give_up(self, now: float) -> None:
         """Handle a stop that did not end in time: the bus accepts nothing."""
         self.duty.happened(Happened.SILENT)     # what has left of it was not answered
-        self._leave_owing(sentences.stop_not_possible())
+        self._warn_if_running(sentences.stop_not_possible())
         self.go_idle()
         self.outbox.clear()
 
@@ -339,7 +339,7 @@ class Session(ABC):
         self.withdraw(reason, now)
         self.setpoints.forget()
         if was_online and self.interlock.position_unknown:
-            self._leave_owing(sentences.position_unknown())
+            self._warn_if_running(sentences.position_unknown())
         self.be_offline(reason)
         self.lost(now, was_online=was_online)
 
@@ -365,7 +365,7 @@ class Session(ABC):
         self.online = False
         self.went_offline()
 
-    def _leave_owing(self, why: Sentence) -> None:
+    def _warn_if_running(self, why: Sentence) -> None:
         """Warn if the drive is left running: commanded to run, and not to stop."""
         if self.duty.happened(Happened.LEFT_ALONE) is Do.WARN:
             self.report.warn(why, may_run=True)

@@ -9,7 +9,7 @@ addressed by itself is a group of one without a broadcast: it gets each frame to
 
 There is one cyclic exchange and one control word. The inverter with the lowest station leads: the
 setpoints are its, and its services bring the whole group to a state. What concerns one inverter
-only (status, samples, parameters, whether it is there, what it is owed) is with its session. The
+only (status, samples, parameters, whether it is there, its pending stop) is with its session. The
 others refuse what only the leader can do; but who stops one of them stops all.
 
 All sessions of a group live on one bus, under one lock, so that they may be called from here.

@@ -97,9 +97,9 @@ class PkwSession(Session):
     # -- life cycle -------------------------------------------------------------------------------
 
     def prepare_stop(self, now: float) -> bool:
-        owes = self.duty.happened(Happened.ENDS) is Do.STOP
+        pending = self.duty.happened(Happened.ENDS) is Do.STOP
         return self.stage is not Stage.IDLE and (
-            owes or self.ever_online and now >= self._node.free_at)
+            pending or self.ever_online and now >= self._node.free_at)
 
     def begin_stop(self, now: float) -> bool:
         self._lifecycle.end()
@@ -123,7 +123,7 @@ class PkwSession(Session):
         self._node.begin(now)
         self._look_for_it(now, now)
         self._begin_rounds(now)
-        self._stop_if_owed(now)
+        self._send_pending_stop(now)
 
     def fall_silent(self) -> None:
         super().fall_silent()
@@ -231,7 +231,7 @@ class PkwSession(Session):
         # a stop takes its course: however often a node restarts, they do not pile up
         if self._channel.is_idle(Priority.STOP):
             self._channel.clear()
-            self._stop_if_owed(now)
+            self._send_pending_stop(now)
 
     def heartbeat_lost(self, now: float) -> None:
         """Handle a node whose heartbeats have ceased."""
@@ -264,7 +264,7 @@ class PkwSession(Session):
             return False
         return True
 
-    def _stop_if_owed(self, now: float) -> None:
+    def _send_pending_stop(self, now: float) -> None:
         """Stop a drive whose stop is pending, although it may not receive anything."""
         if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._writers.stop(now)

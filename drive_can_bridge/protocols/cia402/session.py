@@ -188,9 +188,9 @@ class Cia402Session(Session):
                 self.duty.channel(CYCLE, happened)
         elif self.stage is not Stage.IDLE and found is not None:
             self.report.warn(sentences.still_in_state(found.value), may_run=True)
-        owes = self.duty.happened(Happened.ENDS) is Do.STOP
+        pending = self.duty.happened(Happened.ENDS) is Do.STOP
         return self.stage is not Stage.IDLE and (
-            self.exchange.cycling or owes or self._node_set_up.watch.slot is not None)
+            self.exchange.cycling or pending or self._node_set_up.watch.slot is not None)
 
     def begin_stop(self, now: float) -> bool:
         self._stop_until = now + self.configuration.control_timeout

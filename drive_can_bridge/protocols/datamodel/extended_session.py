@@ -111,8 +111,8 @@ class ExtendedSession(Session):
     def prepare_stop(self, now: float) -> bool:
         self._side.clear()
         self._lifecycle.stop()
-        owes = self.duty.happened(Happened.ENDS) is Do.STOP
-        return self._exchange.cycling or (self.stage is not Stage.IDLE and owes)
+        pending = self.duty.happened(Happened.ENDS) is Do.STOP
+        return self._exchange.cycling or (self.stage is not Stage.IDLE and pending)
 
     def begin_stop(self, now: float) -> bool:
         if self._exchange.cycling:

@@ -63,8 +63,8 @@ class StandardSession(Session):
     def prepare_stop(self, now: float) -> bool:
         self._clear_acyclic()
         self.duty.happened(Happened.SILENT)     # should the stop be confirmed, that is over
-        owes = self.duty.happened(Happened.ENDS) is Do.STOP
-        return self.stage is not Stage.IDLE and (self.online or owes)
+        pending = self.duty.happened(Happened.ENDS) is Do.STOP
+        return self.stage is not Stage.IDLE and (self.online or pending)
 
     def begin_stop(self, now: float) -> bool:
         self._writer.stop()

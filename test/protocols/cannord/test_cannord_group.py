@@ -764,7 +764,7 @@ def test_member_whose_frame_is_refused_gets_one_before_the_stop_ends() -> None:
     assert worries(bus) == []
 
 
-def test_enable_that_only_one_of_them_got_is_owed_a_stop() -> None:
+def test_enable_that_only_one_of_them_got_has_its_stop_pending() -> None:
     bus = three()
     bus.refusing = lambda text: text.startswith('400')
     bus.asks(ENABLE)

@@ -235,7 +235,7 @@ class TestRestarts:
         axis.session.receive_frame(frame('705#00'), axis.now)
         assert axis.talk.sent() == ['080#', '77F#05', '000#0106']
 
-    def test_a_stop_that_is_owed_goes_out(self) -> None:
+    def test_a_pending_stop_goes_out(self) -> None:
         axis = running()
         axis.session.receive_frame(frame('705#00'), axis.now)
         assert DISABLE in axis.talk.sent()

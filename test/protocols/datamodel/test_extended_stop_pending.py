@@ -456,7 +456,7 @@ def test_answer_that_finds_a_drive_shows_nothing_of_a_word_that_was_written_befo
     assert unheard in warnings(talk)
 
 
-def test_disable_that_was_read_back_is_owed_no_more() -> None:
+def test_disable_that_was_read_back_is_pending_no_more() -> None:
     """By the second reading of the stop by number; the cycles before were not answered."""
     talk = enabled_by_number()
     assert talk.until(10.363 + TICK)[-1] == (10.363, '00200341#0000000000000000')

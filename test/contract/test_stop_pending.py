@@ -225,7 +225,7 @@ def stopped_for_a_defect(kind: str, *, mute: bool) -> Partner:
 
 
 @pytest.mark.parametrize('kind', KINDS)
-def test_a_stop_that_failed_for_a_defect_is_owed_on(kind: str) -> None:
+def test_a_stop_that_failed_for_a_defect_stays_pending(kind: str) -> None:
     """The activation goes on behind it: the drive is told again, and named again at the end."""
     partner = stopped_for_a_defect(kind, mute=True)
     session = partner.talk.session
@@ -241,7 +241,7 @@ def test_a_stop_that_failed_for_a_defect_is_owed_on(kind: str) -> None:
 
 
 @pytest.mark.parametrize('kind', KINDS)
-def test_who_is_owed_a_stop_behind_a_defect_is_told_again_by_the_end(kind: str) -> None:
+def test_a_pending_stop_behind_a_defect_is_sent_again_by_the_end(kind: str) -> None:
     """Also within the second for which it is left alone: it may hear this one."""
     partner = stopped_for_a_defect(kind, mute=True)
     session = partner.talk.session
@@ -255,7 +255,7 @@ def test_who_is_owed_a_stop_behind_a_defect_is_told_again_by_the_end(kind: str) 
 
 
 @pytest.mark.parametrize('kind', KINDS)
-def test_who_is_owed_a_stop_behind_a_defect_and_deaf_is_named_once_more(kind: str) -> None:
+def test_a_pending_stop_of_a_deaf_drive_behind_a_defect_is_named_once_more(kind: str) -> None:
     partner = stopped_for_a_defect(kind, mute=True)
     partner.talk.events()
     partner.take()
@@ -265,7 +265,7 @@ def test_who_is_owed_a_stop_behind_a_defect_and_deaf_is_named_once_more(kind: st
 
 
 @pytest.mark.parametrize('kind', KINDS)
-def test_who_is_owed_nothing_behind_a_defect_is_left_alone_by_the_end(kind: str) -> None:
+def test_a_drive_without_a_pending_stop_is_left_alone_behind_a_defect(kind: str) -> None:
     partner = stopped_for_a_defect(kind, mute=False)
     session = partner.talk.session
     assert not session.stop_pending
