@@ -114,6 +114,8 @@ def _check_adapter(tree: Tree, path: Path, values: dict[str, Any], adapters: Ada
         message = check(interface, values[key]) if values.get(key, '') != '' else None
         if message is not None:
             tree.wrong((*path, key), message)
+    if interface == 'slcan' and values['bitrate'] in (750_000, 800_000):
+        tree.suspicious((*path, 'bitrate'), complaints.rate_of_two())
     return adapters.adapter_keywords(interface)
 
 

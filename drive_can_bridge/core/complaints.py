@@ -263,6 +263,10 @@ bitrate_assumed = Text(
 no_bitrate = Text(
     '{bitrate} is impossible with {interface}, allowed is one of {allowed}',
     do='write one of the bit rates that are allowed, and set the drives to the same')
+rate_of_two = Text(
+    'one command, S7, sets 800000 bit/s in adapters that keep to LAWICEL, and 750000 bit/s in '
+    'CANable 1 and 2',
+    do='see which bit rate S7 is in your adapter: one at another rate disturbs the bus')
 adapter_does_not_name = Text(
     'the adapter for {interface} does not name this key{near}; it is handed over all the same',
     do="compare the key with python-can's page on that interface")

@@ -128,7 +128,9 @@ class SlcanAdapter:
             if self.is_open or not (command in BIT_RATES or _TIMING.fullmatch(command)):
                 reply = REFUSED
             elif self._bitrate is not None:
-                self._set = BIT_RATES.get(command, self._bitrate)   # s…: not checked
+                rate = BIT_RATES.get(command, self._bitrate)   # s…: not checked
+                # S7 is the one or the other, by adapter
+                self._set = self._bitrate if (rate, self._bitrate) == (750_000, 800_000) else rate
         elif command == 'F' and not self.is_open:
             reply = REFUSED
         else:

@@ -25,6 +25,7 @@ from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.transport.bus_identity import identity_of, SERIAL_INTERFACES
 from drive_can_bridge.transport.known_adapters import (
     BY_NAME, traits_of as traits_of, what_helps)
+from drive_can_bridge.transport.serial_writer import MORE_RATES
 
 #: how a channel begins that pyserial opens, but is no device here; others may write files
 _REMOTE = ('socket://', 'rfc2217://')
@@ -110,7 +111,10 @@ def check_bitrate(interface: str, bitrate: int) -> Sentence | None:
         rates = getattr(_adapter_class(interface), '_BITRATES', None)
     except _Unusable:
         return None
-    if not isinstance(rates, dict) or not rates or bitrate in rates:
+    if not isinstance(rates, dict) or not rates:
+        return None
+    rates = {**rates, **MORE_RATES.get(interface, {})}
+    if bitrate in rates:
         return None
     return complaints.no_bitrate(
         bitrate=bitrate, interface=interface,

@@ -91,7 +91,8 @@ ROWS: tuple[Row, ...] = (
     # -- serial lines with text
     Row('slcan', 'any adapter with SLCAN (LAWICEL) commands', 'slcan', '/dev/ttyACM0',
         'answers, rates and limits are those of its firmware, below; stamps of its own clock, or '
-        'none; it may still send what it had been handed when the bridge ends',
+        'none; it may still send what it had been handed when the bridge ends; S7 is 800 kbit/s, '
+        'or 750 kbit/s (CANable 1 and 2)',
         '`adapter:` with the name of its row, where there is one', PARSER,
         listen_only='listen_only: true', module='pyserial'),
     Row('canable', 'CANable 1 with slcan firmware', 'slcan', '/dev/ttyACM0',

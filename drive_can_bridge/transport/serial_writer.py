@@ -52,6 +52,9 @@ REFUSED_MAX = 4
 REFUSED_TIME = 0.05
 #: s that each command to a serial adapter may take while it is opened
 OPEN_TIMEOUT = 0.5
+#: bit rates that python-can's class lacks: S7 is 800 kbit/s by LAWICEL's manual, and 750 kbit/s of
+#: CANable 1 and 2, the only one that python-can has it for
+MORE_RATES: dict[str, dict[int, str]] = {'slcan': {800_000: 'S7'}}
 
 
 class AdapterAnswers:
@@ -292,8 +295,10 @@ def watched(adapter: type[Any], interface: str, attribute: str, now: Callable[[]
         object.__setattr__(self, name, value)
 
     slcan = interface == 'slcan'
-    return type(adapter.__name__, (_SlcanLines, adapter) if slcan else (adapter,), {
-        '__setattr__': set_attribute, 'drive_can_now': staticmethod(now)})
+    members: dict[str, Any] = {'__setattr__': set_attribute, 'drive_can_now': staticmethod(now)}
+    if slcan:
+        members['_BITRATES'] = {**adapter._BITRATES, **MORE_RATES[interface]}
+    return type(adapter.__name__, (_SlcanLines, adapter) if slcan else (adapter,), members)
 
 
 def _hurry(port: Any) -> None:

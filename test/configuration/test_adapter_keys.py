@@ -79,6 +79,7 @@ def test_what_helps_of_every_interface_with_a_row() -> None:
 
 def test_bit_rates() -> None:
     assert check_bitrate('slcan', 125000) is None
+    assert check_bitrate('slcan', 800000) is None     # CiA 301, LAWICEL's manual
     assert check_bitrate('virtual', 123456) is None
     found = check_bitrate('slcan', 123456)
     assert found == says('no_bitrate', bitrate=123456, interface='slcan')

@@ -2,6 +2,7 @@
 """What is said of adapters that cannot do what the drives of a file need."""
 
 from pathlib import Path
+import re
 
 from configuration_builders import at, changed, FILE, problems, warnings
 import pytest
@@ -35,6 +36,13 @@ def with_bus(lines: str) -> str:
     (LAWICEL, []), ('interface: socketcan\n        channel: can7', [])])
 def test_errors(tmp_path: Path, lines: str, expected: list[str]) -> None:
     assert problems(tmp_path, with_bus(lines), adapters=adapters) == expected
+
+
+@pytest.mark.parametrize('bitrate', [750000, 800000])
+def test_one_command_has_two_bit_rates(tmp_path: Path, bitrate: int) -> None:
+    text = re.sub('bitrate: [0-9]+', f'bitrate: {bitrate}', with_bus(LAWICEL))
+    assert warnings(tmp_path, text, adapters=adapters) == [
+        at('f.yaml:9: buses.main.bitrate', 'rate_of_two')]
 
 
 def test_a_period_that_is_shorter_than_what_is_received_is_kept(tmp_path: Path) -> None:

@@ -700,7 +700,7 @@ class DoesNotOpen(Usbtin):
 @pytest.mark.usefixtures('threads')
 @pytest.mark.parametrize(('firmware', 'bitrate', 'why'), [
     (Usbtin, 125_000, ''), (Lawicel, 125_000, ''), (Canable, 125_000, ''), (Esp32, 125_000, ''),
-    (Usbtin, 83_300, 'the adapter refuses bit rate 83300'),
+    (Usbtin, 800_000, ''), (Usbtin, 83_300, 'the adapter refuses bit rate 83300'),
     (Esp32, 50_000, 'the adapter refuses bit rate 50000'),
     (DoesNotOpen, 125_000, 'the adapter does not open')])
 def test_adapters_are_believed(firmware: type[Firmware], bitrate: int, why: str) -> None:
