@@ -8,8 +8,10 @@ SDO server of a node are on an identifier that is its own.
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.events import ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame, Route
-from drive_can_bridge.core.messages import NOTHING, Sentence
+from drive_can_bridge.core.messages import Sentence
+from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import NmtCommand
 from drive_can_bridge.protocols.telegrams import Direction
@@ -30,18 +32,17 @@ def sdo_route(node: int) -> Route:
     return Route.of(sdo.REQUEST_BASE + node)
 
 
-def nmt_command(frame: Frame, node: int) -> Sentence:
-    """Return what another master orders by NMT; '' where it is not about this node."""
+def report_nmt(frame: Frame, node: int, report: Reporter) -> None:
+    """Report an NMT command of another master, if it is for this node."""
     try:
         number, addressed = network.decode_nmt(frame.data)
         command = NmtCommand(number)
     except (RemoteProtocolError, ValueError):
-        return NOTHING
-    if addressed not in (0, node):
-        return NOTHING
-    whom = f'node {node}' if addressed else 'all nodes'
-    row = sentences.other_master_resets if command in _RESETS else sentences.other_master_nmt
-    return row(_COMMANDS[command], whom, str(frame))
+        return
+    if addressed in (0, node):
+        whom = f'node {node}' if addressed else 'all nodes'
+        row = sentences.other_master_resets if command in _RESETS else sentences.other_master_nmt
+        report.note(ForeignMasterSeen(row(_COMMANDS[command], whom, str(frame))))
 
 
 def sdo_request(frame: Frame, node: int) -> Sentence:

@@ -19,12 +19,14 @@ heartbeat: operational          allowed
 Who starts a node, and when, the sessions decide.
 """
 
+from collections.abc import Callable
 from enum import Enum
 import math
 from typing import Protocol
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.session import Stage
@@ -102,6 +104,25 @@ class WatchedNode:
             self.free_at = at + START_PAUSE
 
     # -- input ------------------------------------------------------------------------------------
+
+    def receive(self, frame: Frame, report: Reporter, take: Callable[[NmtState, float], None],
+                now: float) -> bool:
+        """
+        Handle a heartbeat or emergency message of the node; return whether it was one.
+
+        :param take: takes the state in a heartbeat.
+        :raises RemoteProtocolError: it is malformed.
+        """
+        base = frame.identifier - self.number
+        if base == network.HEARTBEAT_BASE and not frame.data:
+            self.take_empty_heartbeat(report, now)
+        elif base == network.HEARTBEAT_BASE:
+            take(network.decode_heartbeat(frame.data), now)
+        elif base == network.EMERGENCY_BASE:
+            self.take_emergency(frame.data, report)
+        else:
+            return False
+        return True
 
     def receive_heartbeat(self, state: NmtState, now: float) -> NodeChange:
         """Handle a boot-up frame or heartbeat."""

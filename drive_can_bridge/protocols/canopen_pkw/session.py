@@ -251,19 +251,6 @@ class PkwSession(Session):
         return (Failure(FailureKind.OFFLINE, sentences.drive_offline_because(text)) if text else
                 None)
 
-    def _node_says(self, identifier: int, data: bytes, now: float) -> bool:
-        """Handle a heartbeat or emergency message of the node; return whether it was one."""
-        base = identifier - self._node.number
-        if base == network.HEARTBEAT_BASE and not data:
-            self._node.take_empty_heartbeat(self.report, now)
-        elif base == network.HEARTBEAT_BASE:
-            self._take_heartbeat(network.decode_heartbeat(data), now)
-        elif base == network.EMERGENCY_BASE:
-            self._node.take_emergency(data, self.report)
-        else:
-            return False
-        return True
-
     def _send_pending_stop(self, now: float) -> None:
         """Stop a drive whose stop is pending, although it may not receive anything."""
         if self.duty.happened(Happened.STARTED) is Do.STOP:
@@ -310,16 +297,14 @@ class PkwSession(Session):
                 if not self._channel.receive(message, now):
                     late = self._channel.late(now - age, message)
                     self.report.unasked(sentences.unasked_pkw(str(message)), late, now)
-            elif self._node_says(identifier, data, now):
+            elif self._node.receive(frame, self.report, self._take_heartbeat, now):
                 self._end_futile_stop(now)
                 self._writers.again.sign_of_life(now, hurry=True)
             elif identifier == options.request_cob_id:
                 self.report.note(ForeignMasterSeen(sentences.other_master_asks_node(
                     self.configuration.station, 'PKW requests', str(frame))))
             elif identifier == network.NMT_IDENTIFIER:
-                ordered = masters.nmt_command(frame, self.configuration.station)
-                if ordered:
-                    self.report.note(ForeignMasterSeen(ordered))
+                masters.report_nmt(frame, self.configuration.station, self.report)
             elif identifier == sdo.REQUEST_BASE + self.configuration.station:
                 self.report.note(ForeignMasterSeen(
                     masters.sdo_request(frame, self.configuration.station)))

@@ -379,16 +379,9 @@ class Cia402Session(Session):
                     masters.sdo_request(frame, node) if identifier == sdo.REQUEST_BASE + node
                     else sentences.other_master_asks_node(node, 'process data', str(frame))))
             elif identifier == network.NMT_IDENTIFIER:
-                ordered = masters.nmt_command(frame, self.configuration.station)
-                if ordered:
-                    self.report.note(ForeignMasterSeen(ordered))
-            elif identifier == network.HEARTBEAT_BASE + self.configuration.station and not data:
-                self._node.take_empty_heartbeat(self.report, now)
-            elif identifier == network.HEARTBEAT_BASE + self.configuration.station:
-                self._take_heartbeat(network.decode_heartbeat(data), now)
-            elif identifier == network.EMERGENCY_BASE + self.configuration.station:
-                self._node.take_emergency(data, self.report)
-                if self._missed_bridge:
+                masters.report_nmt(frame, self.configuration.station, self.report)
+            elif self._node.receive(frame, self.report, self._take_heartbeat, now):
+                if identifier < network.HEARTBEAT_BASE and self._missed_bridge:
                     self._heartbeats.was_missed(self._answers.timing, now)
         except Unasked as error:
             self.report.unasked(sentences.malformed(error.sentence), self._channel.late(
