@@ -381,19 +381,22 @@ class World:
         self.delay = LATE
 
     def _twice(self) -> None:
-        self.twice = True
+        # answers that say nothing cannot be told apart where late ones never end
+        self.twice = self.delay != SLOW or not isinstance(self.partners[0].device, StandardDrive)
 
     def _slow(self) -> None:
         self.delay = SLOW
+        if isinstance(self.partners[0].device, StandardDrive):
+            self.twice = False      # as above
 
     def _lossy(self) -> None:
-        self.lossy = True
+        self.lossy = self.now >= self.looked_at     # else nobody has looked at the maps by then
 
     def _cycles_lost(self) -> None:
         self.cycles_lost = True
 
     def _requests_lost(self) -> None:
-        self.requests_lost = True
+        self.requests_lost = self.now >= self.looked_at     # as above
 
     def _trips(self) -> None:
         """Stop by a fault of their own; of one without a word nobody can tell when it ended."""
@@ -492,7 +495,7 @@ class World:
 
     def _maps(self) -> None:
         """Have somebody change the request map: what was the setpoint is nothing any more."""
-        if self.kind.maps:
+        if self.kind.maps and not (self.lossy or self.requests_lost):
             self.looked_at = self.now + MAPS_LOOKED_AT
             for partner in self.partners:
                 partner.motor[122] = 209

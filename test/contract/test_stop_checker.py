@@ -84,6 +84,14 @@ def test_what_arrives_is_no_answer_to_a_question_that_never_left(kind: str) -> N
     assert not broken(kind, (('slow', 0.11), ('refuses', 0.013), ('end', 0.0)))
 
 
+@pytest.mark.parametrize('kind', [kind for kind in KINDS if '29 bit' in kind])
+@pytest.mark.parametrize('before', ['stall', 'quick_stop', 'disable'])
+@pytest.mark.parametrize('end', ['end', 'bus down'])
+def test_a_drive_that_answers_cycles_and_does_not_obey_its_word_is_named(
+        kind: str, before: str, end: str) -> None:
+    assert not broken(kind, (('requests lost', 0.0), (before, 0.9), (end, 0.013)))
+
+
 def _nothing(*_: Any, **__: Any) -> None:
     pass
 

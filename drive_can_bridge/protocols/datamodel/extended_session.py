@@ -44,7 +44,7 @@ from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.reporter import AdviceKind
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session, Stage
-from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
+from drive_can_bridge.core.stop_duty import CONTROL_WORD, CYCLE, Do, Happened
 from drive_can_bridge.protocols.answers import CycleAnswers
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 from drive_can_bridge.protocols.datamodel import extended, procedures
@@ -111,8 +111,19 @@ class ExtendedSession(Session):
     def prepare_stop(self, now: float) -> bool:
         self._side.clear()
         self._lifecycle.stop()
+        self._judge_word()
         pending = self.duty.happened(Happened.ENDS) is Do.STOP
         return self._exchange.cycling or (self.stage is not Stage.IDLE and pending)
+
+    def bus_down(self, now: float, reason: str) -> None:
+        self._judge_word()
+        super().bus_down(now, reason)
+
+    def _judge_word(self) -> None:
+        """Record a drive that answers cycles, as if it had heard its word, but runs on."""
+        if self.control is not None and self.control.unconfirmed and (
+                self._side.control_slot is None):
+            self.duty.channel(CONTROL_WORD, Happened.RUN_LEFT)
 
     def begin_stop(self, now: float) -> bool:
         if self._exchange.cycling:
