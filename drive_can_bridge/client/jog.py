@@ -41,6 +41,8 @@ RATE, IN_TIMEOUT = 20.0, 4
 LONGEST_TIMEOUT = 2.0
 #: s until the setpoint is armed; until what is published is sent; until neutral was answered
 ARMING_TIMEOUT, TAKING_TIMEOUT, NEUTRAL_TIMEOUT = 5.0, 1.0, 2.0
+#: s without anything from the bridge, which is asked all the time and publishes once a second
+SILENCE = 2.0
 #: s between two questions to the bridge: whether it is armed, and which others command
 ASK_PERIOD = 0.1
 #: s that an answer of the bridge may take
@@ -246,6 +248,7 @@ class Jog:
             Inbox(node, self._message_type, target.topic, any_publisher, self._take_command))
         self._out = NewestPublisher(node, self._message_type, target.topic)
         self._phase, self._since = _Phase.ARMING, graph.now()
+        self._heard_at = self._since        # something of the bridge
         self._published_at = self._due = self._ask_at = -math.inf
         self._asking = self._armed = False
         self._sent: Value | None = None     # by the bridge, as its last message shows
@@ -270,7 +273,9 @@ class Jog:
         if not self._value_answered:
             return JogOutcome(False, sentences.jog_unanswered(value=value))
         if not self._neutral_answered:
-            return JogOutcome(False, sentences.jog_neutral_unseen())
+            silent = self._graph.now() - self._heard_at > 0.5 * SILENCE
+            return JogOutcome(False, sentences.jog_bridge_silent(0.5 * SILENCE) if silent else
+                              sentences.jog_neutral_unseen())
         return JogOutcome(True, sentences.jog_done(value=value))
 
     def close(self) -> None:
@@ -313,6 +318,8 @@ class Jog:
                 self._end(sentences.jog_not_armed(seconds=ARMING_TIMEOUT))
         elif now - self._published_at > self._target.timeout:
             self._end(sentences.jog_late(seconds=now - self._published_at))
+        elif now - self._heard_at > SILENCE:
+            self._end(sentences.jog_bridge_silent(SILENCE))
         elif now - self._since > TAKING_TIMEOUT and not self._is_sent(self._target.value):
             self._end(sentences.jog_not_taken(
                 wanted=self._target.in_words(self._target.value), seconds=TAKING_TIMEOUT))
@@ -340,6 +347,7 @@ class Jog:
             self._asking = False
             if answer is None or len(answer.values) != 2:
                 return
+            self._heard_at = self._graph.now()
             text, publishers = (value_of(value) for value in answer.values)
             self._armed = any(each.get('armed') is True for each in _read(text) or ()
                               if each['name'] == self._target.parameter.name)
@@ -358,6 +366,7 @@ class Jog:
             self._end(sentences.jog_commanded(who=[self._target.topic]))
 
     def _take_request(self, message: ParameterEvent) -> None:
+        self._heard_at = self._graph.now()
         for each in message.changed_parameters:
             if each.name == self._target.parameter.name:
                 sent = drive_value(each.value)
@@ -370,6 +379,7 @@ class Jog:
                 wanted=self._target.in_words(self._target.value)))
 
     def _take_response(self, message: ParameterEvent) -> None:
+        self._heard_at = self._graph.now()
         self.values.update(
             (each.name, value) for each in message.changed_parameters
             if (value := drive_value(each.value)) is not None)

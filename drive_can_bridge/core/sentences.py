@@ -956,6 +956,11 @@ jog_not_taken = Text(
 jog_late = Text(
     'this process stood still for {seconds:.1f} s, longer than command_timeout',
     do='see what else the computer does')
+jog_bridge_silent = Text(
+    'nothing has come from its bridge for {seconds:g} s: if the bridge has ended, the drive may '
+    'still be running',
+    do='make sure that the drive stands still, by other means if need be; see whether the bridge '
+       'still runs')
 jog_unanswered = Text(
     'no exchange that carried {value} was answered', do='see diagnostics of the drive')
 jog_neutral_unseen = Text(

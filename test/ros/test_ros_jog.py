@@ -14,6 +14,7 @@ from std_msgs.msg import Float64
 
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.client import jog
+from drive_can_bridge.core import sentences
 
 #: as long as jog allows; the bench does not depend on how busy the machine is
 DRIVE = {**LIFT, 'command_timeout': 2.0}
@@ -252,6 +253,24 @@ def test_never_the_value_again_after_a_standstill(bridge: StartBridge, run: Run,
     assert code == 1 and 'this process stood still for 5.' in errors
     assert set(published[stalled[0]:]) == {0.0} and 300.0 in published
     assert speeds(one) == [0.0]
+
+
+@pytest.mark.parametrize('seconds', ['60', '1'])    # it goes before the time, or at its end
+def test_a_bridge_that_was_killed_ends_it(bridge: StartBridge, run: Run,
+                                          monkeypatch: pytest.MonkeyPatch, seconds: str) -> None:
+    enabled(bridge, run)
+    judge = jog.Jog._judge
+
+    def kill(self: jog.Jog, now: float) -> None:
+        if self._value_answered:        # a SIGKILL takes no leave
+            self._inboxes = ()
+            monkeypatch.setattr(self._calls, 'look', lambda now: None)
+        judge(self, now)
+    monkeypatch.setattr(jog.Jog, '_judge', kill)
+    code, _, errors = run('jog', 'lift', '300', '--yes', '--for', seconds)
+    assert code == 1
+    assert errors.rstrip() == 'lift: ' + sentences.jog_bridge_silent(
+        jog.SILENCE if seconds == '60' else 0.5 * jog.SILENCE)
 
 
 def test_a_terminal_that_was_closed_ends_it(bridge: StartBridge, run: Run,
