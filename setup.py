@@ -129,6 +129,8 @@ class CompileModules(build_ext):
 
     def run(self) -> None:
         """Make C of the modules in a folder of its own, and libraries of that."""
+        if not self.extensions:     # setup.py develop asks for it in any case
+            return
         if self.inplace or getattr(self, 'editable_mode', False):
             raise go_on(
                 'DRIVE_CAN_COMPILED is set for an installation that follows this checkout (pip '

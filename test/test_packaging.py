@@ -2,6 +2,7 @@
 """What is installed: versions agree, and nothing is left behind."""
 
 import ast
+from collections.abc import Iterable
 import importlib.metadata
 import importlib.util
 import json
@@ -322,6 +323,27 @@ def test_no_library_stands_beside_sources_that_may_change() -> None:
     assert not [path for path in files_below(PACKAGE) if path.suffix == '.so']
 
 
+def set_up(folder: Path, words: Iterable[str], **environment: str,
+           ) -> 'subprocess.CompletedProcess[str]':
+    """Call setup.py of a copy, with a builder of another version."""
+    checkout = folder / 'checkout'
+    shutil.copytree(CHECKOUT, checkout, ignore=shutil.ignore_patterns(
+        '.*', '*.egg-info', '__pycache__', 'test', 'bench', 'docs', 'findings', 'build', 'view'))
+    (folder / 'mypy-0.0.1.dist-info').mkdir()
+    (folder / 'mypy-0.0.1.dist-info' / 'METADATA').write_text('Name: mypy\nVersion: 0.0.1\n')
+    inherited = {key: value for key, value in os.environ.items() if key != 'DRIVE_CAN_COMPILED'}
+    return subprocess.run(
+        [sys.executable, 'setup.py', *words], cwd=checkout, text=True, capture_output=True,
+        env={**inherited, 'PYTHONPATH': str(folder), **environment}, check=False)
+
+
+def test_what_follows_a_checkout_installs_as_pure_python(tmp_path: Path, programs: None) -> None:
+    """So do setup.py develop and colcon build --symlink-install, compiled or not."""
+    done = set_up(tmp_path, ('build_ext', '--inplace'))
+    assert done.returncode == 0, done.stderr
+    assert not list(tmp_path.rglob('*.so'))
+
+
 @pytest.mark.parametrize(('words', 'told'), [
     (('build_ext', '--inplace'), 'beside sources that change'),
     (('develop', '--no-deps', '--install-dir', 'bin'), 'beside sources that change'),
@@ -330,14 +352,8 @@ def test_no_library_stands_beside_sources_that_may_change() -> None:
 ])
 def test_a_build_that_cannot_be_compiled_says_how_to_go_on_and_installs_nothing(
         words: tuple[str, ...], told: str, tmp_path: Path, programs: None) -> None:
+    done = set_up(tmp_path, words, DRIVE_CAN_COMPILED='1')
     checkout = tmp_path / 'checkout'
-    shutil.copytree(CHECKOUT, checkout, ignore=shutil.ignore_patterns(
-        '.*', '*.egg-info', '__pycache__', 'test', 'bench', 'docs', 'findings', 'build', 'view'))
-    (tmp_path / 'mypy-0.0.1.dist-info').mkdir()
-    (tmp_path / 'mypy-0.0.1.dist-info' / 'METADATA').write_text('Name: mypy\nVersion: 0.0.1\n')
-    done = subprocess.run(
-        [sys.executable, 'setup.py', *words], cwd=checkout, text=True, capture_output=True,
-        env={**os.environ, 'DRIVE_CAN_COMPILED': '1', 'PYTHONPATH': str(tmp_path)}, check=False)
     assert done.returncode != 0
     last = done.stderr.strip().splitlines()[-1]
     assert told in last and 'Without DRIVE_CAN_COMPILED' in last
