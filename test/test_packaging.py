@@ -338,7 +338,7 @@ def set_up(folder: Path, words: Iterable[str], **environment: str,
 
 
 def test_what_follows_a_checkout_installs_as_pure_python(tmp_path: Path, programs: None) -> None:
-    """So do setup.py develop and colcon build --symlink-install, compiled or not."""
+    """The part of setup.py develop, and so of colcon build --symlink-install, that compiles."""
     done = set_up(tmp_path, ('build_ext', '--inplace'))
     assert done.returncode == 0, done.stderr
     assert not list(tmp_path.rglob('*.so'))
