@@ -4,6 +4,7 @@
 import math
 
 import pytest
+from stops import written_again
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine, RESET_CYCLES
@@ -22,6 +23,8 @@ UNSEEN = ControlTable(parameter='control_word', disable=OFF, enable=RUN)
 JUDGED = Judged(0.02)
 WEARS = Judged(0.02, wears=True)
 ACKNOWLEDGED = Acknowledged()
+#: ms after which a word is written again
+AGAIN = [round(1000 * after) for after in written_again()]
 
 
 def schedule(count: int, *, slot: int | None = None, refresh: float = 0.0) -> AcyclicOutput:
@@ -185,7 +188,7 @@ def test_an_eeprom_gets_a_stop_again_a_few_times_and_late() -> None:
 
 
 @pytest.mark.parametrize(('policy', 'again'), [
-    (JUDGED, [200, 600, 1400]), (WEARS, []), (ACKNOWLEDGED, [])])
+    (JUDGED, AGAIN), (WEARS, []), (ACKNOWLEDGED, [])])
 def test_what_starts_a_drive_is_repeated_only_where_nobody_acknowledges_it(
         policy: Policy, again: list[int]) -> None:
     control = machine(STANDING)
@@ -208,11 +211,11 @@ def test_a_drive_at_fault_that_ran_gets_disable_three_times_more() -> None:
         if tick == 0 or output.word_due(now):
             again.append(tick * 10)
             tell(output, control, now)
-    assert again == [0, 200, 600, 1400]
+    assert again == [0, *AGAIN]
 
 
 @pytest.mark.parametrize(('policy', 'again'), [
-    (JUDGED, [200, 600, 1400]), (WEARS, []), (ACKNOWLEDGED, [])])
+    (JUDGED, AGAIN), (WEARS, []), (ACKNOWLEDGED, [])])
 def test_a_drive_that_ran_and_reports_nothing_gets_its_stop_three_times_more(
         policy: Policy, again: list[int]) -> None:
     control = ControlMachine(UNSEEN, timeout=2.0)

@@ -15,6 +15,7 @@ from extended_builders import (
 )
 import pytest
 from saying import says
+from stops import written_again
 from timeline import Timeline
 
 from drive_can_bridge.core.control import ControlAction
@@ -153,13 +154,17 @@ def test_word_that_got_lost_is_written_again() -> None:
     talk = beside()
     exchange(talk, 10.02, READY)
     talk.asks(ControlAction.ENABLE, 10.025)
-    # lost; after 0.2 s, and then after 0.4 s, each behind one more neutral cycle
-    assert cycles(talk, 2, 40, READY) == [(2, ENABLE), (13, ENABLE), (34, ENABLE)]
-    assert cycles(talk, 41, 60, ENABLED) == []
+    # lost; then twice more, each behind one more neutral cycle
+    first, second = (2 + round(after / 0.02) for after in written_again()[:2])
+    end = second + 8
+    assert cycles(talk, 2, end, READY) == [
+        (2, ENABLE), (first + 1, ENABLE), (second + 2, ENABLE)]
+    assert cycles(talk, end + 1, end + 20, ENABLED) == []
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
-    assert talk.asks(ControlAction.DISABLE, 11.205) == [DISABLE]   # lost
-    assert cycles(talk, 61, 72, ENABLED) == [(71, DISABLE)]
-    assert cycles(talk, 73, 90, READY) == []
+    end += 20
+    assert talk.asks(ControlAction.DISABLE, 10.005 + 0.02 * end) == [DISABLE]   # lost
+    assert cycles(talk, end + 1, end + first, ENABLED) == [(end + first - 1, DISABLE)]
+    assert cycles(talk, end + first + 1, end + first + 18, READY) == []
     assert talk.control_outcomes() == [('disable', True, 'ready')]
 
 
@@ -234,9 +239,9 @@ def test_reset_pulse_of_a_drive_that_reports_nothing() -> None:
 
 
 @pytest.mark.parametrize(('action', 'times'), [
-    (ControlAction.DISABLE, {DISABLE: [10.5, 10.7, 11.1, 11.9]}),
+    (ControlAction.DISABLE, {DISABLE: [10.5, *written_again(10.5)]}),
     (ControlAction.QUICK_STOP, {     # which keeps its word for 2 s
-        QUICK_STOP: [10.5, 10.7, 11.1, 11.9], DISABLE: [12.5, 12.7, 13.1, 13.9]})])
+        QUICK_STOP: [10.5, *written_again(10.5)], DISABLE: [12.5, *written_again(12.5)]})])
 def test_a_drive_that_reports_nothing_is_told_to_stop_more_than_once(
         action: ControlAction, times: dict[str, list[float]]) -> None:
     """A write may get lost, nobody acknowledges it, and no status says that it did."""
