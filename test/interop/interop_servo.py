@@ -3,7 +3,7 @@
 
 from typing import Any
 
-from builders import drive
+from builders import drive, read, write
 from interop_bridge import Bridge, DEADLINE
 from waiting import clock
 
@@ -40,3 +40,24 @@ def bridge_on(bus: BusConfiguration, **options: Any) -> Bridge:
 def command(bridge: Bridge, value: float) -> None:
     with bridge.exchange.lock:
         bridge.session.services.command(0, value, clock().now())
+
+
+def obeyed(state: int, word: int) -> int:
+    """Return the state in which a control word leaves a drive: the bits of its status word."""
+    if state == 0x08:
+        return 0x40 if word & 0x80 else state
+    if word & 0x06 != 0x06:
+        return 0x40
+    if not word & 0x01:
+        return 0x21
+    if state in (0x21, 0x27) and not word & 0x08:
+        return 0x23
+    return 0x27 if word & 0x08 and state == 0x23 else state
+
+
+def parameters_go_both_ways(bridge: Bridge) -> None:
+    velocity, offset, missing = names('profile_velocity', 'home_offset', 'torque_slope')
+    assert bridge.outcome(write((velocity, 1234), (offset, -5))) == ['written', 'written']
+    assert bridge.outcome(read(velocity, offset)) == [1234, -5]
+    refused, = bridge.outcome(read(missing))
+    assert '06020000h' in str(refused)

@@ -13,11 +13,11 @@ import os
 from pathlib import Path
 from typing import Any
 
-from builders import read, write
 import can
 from interop_bridge import DEADLINE, dictionary_of, objectdictionary
 from interop_servo import (
-    bridge_on, bus_of, command, names, NODE, PERIOD, servo_configuration,
+    bridge_on, bus_of, command, NODE, obeyed, parameters_go_both_ways,
+    PERIOD, servo_configuration,
 )
 import pytest
 from waiting import clock, wait_for
@@ -279,17 +279,7 @@ class Device:
     def _obey(self, word: int) -> None:
         if word != self.words[-1]:
             self.words.append(word)
-        if self.state == 0x08:
-            if word & 0x80:
-                self.state = 0x40
-        elif word & 0x06 != 0x06:
-            self.state = 0x40
-        elif not word & 0x01:
-            self.state = 0x21
-        elif not word & 0x08 and self.state in (0x21, 0x27):
-            self.state = 0x23
-        elif word & 0x08 and self.state == 0x23:
-            self.state = 0x27
+        self.state = obeyed(self.state, word)
 
 
 def test_bridge_drives_a_device_of_the_other_stack(place: tuple[BusConfiguration, Any]) -> None:
@@ -312,11 +302,7 @@ def test_bridge_drives_a_device_of_the_other_stack(place: tuple[BusConfiguration
         command(bridge, 0.0)
         command(bridge, 60.0)
         wait_for(lambda: bridge.samples[-1] == (0x0237, 10_000), 'the speed')
-        velocity, offset, missing = names('profile_velocity', 'home_offset', 'torque_slope')
-        assert bridge.outcome(write((velocity, 1234), (offset, -5))) == ['written', 'written']
-        assert bridge.outcome(read(velocity, offset)) == [1234, -5]
-        refused, = bridge.outcome(read(missing))
-        assert '06020000h' in str(refused)
+        parameters_go_both_ways(bridge)
         device.state = 0x08
         wait_for(lambda: bridge.samples[-1][0] == 0x0218, 'the fault')
         assert not bridge.control(ControlAction.ENABLE)

@@ -11,12 +11,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from builders import read, write
 from bus import End
 from durand_bench import Wiring
 from interop_bridge import Bridge
 from interop_servo import (
-    bridge_on, bus_of, command, names, NODE, PERIOD, SERVO, servo_configuration,
+    bridge_on, bus_of, command, NODE, obeyed, parameters_go_both_ways,
+    PERIOD, SERVO, servo_configuration,
 )
 import pytest
 from saying import says
@@ -95,16 +95,7 @@ class Device:
             self.od.write(0x606C, 0, speed)
 
     def _obey(self, word: int) -> None:
-        if self.state == 0x08:
-            self.state = 0x40 if word & 0x80 else 0x08
-        elif word & 0x06 != 0x06:
-            self.state = 0x40
-        elif not word & 0x01:
-            self.state = 0x21
-        elif not word & 0x08 and self.state in (0x21, 0x27):
-            self.state = 0x23
-        elif word & 0x08 and self.state == 0x23:
-            self.state = 0x27
+        self.state = obeyed(self.state, word)
 
 
 @pytest.fixture
@@ -133,11 +124,7 @@ def test_it_is_set_up_runs_and_is_stopped(channel: str, device: Device) -> None:
         entries = [device.od.read(0x1600, n) for n in range(3)]
         assert entries == [2, 0x60400010, 0x60FF0020]
         assert [device.od.read(0x1A00, n) for n in range(3)] == [2, 0x60410010, 0x606C0020]
-        velocity, offset, missing = names('profile_velocity', 'home_offset', 'torque_slope')
-        assert bridge.outcome(write((velocity, 1234), (offset, -5))) == ['written', 'written']
-        assert bridge.outcome(read(velocity, offset)) == [1234, -5]
-        refused, = bridge.outcome(read(missing))
-        assert '06020000h' in str(refused)
+        parameters_go_both_ways(bridge)
         device.state = 0x08
         wait_for(lambda: bridge.samples[-1][0] == 0x0208, 'the fault')
         assert not bridge.control(ControlAction.ENABLE)

@@ -1,8 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """One SYNC for all drives of a bus, and the pace that a drive has of its own (event)."""
 
+from functools import partial
 from typing import Any
 
+from coming import Coming
 from drives import ServoDrive
 import pytest
 from servo_builders import Axis, OBJECTS, servo
@@ -28,7 +30,7 @@ class Bus:
         self.now = 10.0
         self.delay = DELAY
         self.log: list[tuple[float, str]] = []
-        self.coming: list[tuple[float, Frame]] = []
+        self.coming = Coming()
         self.events: dict[str, list[Any]] = {drive.name: [] for drive in drives}
 
     def pump(self, place: int) -> None:
@@ -38,8 +40,8 @@ class Bus:
             for sent in frames:
                 self.log.append((round(self.now, 6), str(sent)))
                 for drive in self.drives.values():
-                    self.coming += [
-                        (self.now + self.delay, answer) for answer in drive.takes(sent)]
+                    for answer in drive.takes(sent):
+                        self.coming.plan(self.now + self.delay, partial(self.arrives, answer))
         self.events[session.configuration.name] += session.take_events()
         self.due[place] = session.next_timer()
 
@@ -52,26 +54,20 @@ class Bus:
 
     def live(self, duration: float) -> None:
         end = self.now + duration
-        while True:
-            arrives = min((at for at, _ in self.coming), default=float('inf'))
-            soonest = min(*self.due, arrives)
-            if soonest > end:
-                self.now = end
-                return
-            self.now = max(self.now, soonest)
-            if arrives <= soonest:
-                entry = min(self.coming, key=lambda each: each[0])
-                self.coming.remove(entry)
-                node = entry[1].identifier & 0x7F
-                for place, session in enumerate(self.sessions):
-                    if session.configuration.station == node:
-                        session.receive_frame(entry[1], self.now)
-                        self.pump(place)
-                continue
-            for place, session in enumerate(self.sessions):
-                if self.due[place] <= self.now:
-                    session.handle_timer(self.now)
-                    self.pump(place)
+        self.coming.live(self, end, due=lambda: min(self.due), timers=self.timers)
+        self.now = end
+
+    def arrives(self, answer: Frame) -> None:
+        for place, session in enumerate(self.sessions):
+            if session.configuration.station == answer.identifier & 0x7F:
+                session.receive_frame(answer, self.now)
+                self.pump(place)
+
+    def timers(self) -> None:
+        for place, session in enumerate(self.sessions):
+            if self.due[place] <= self.now:
+                session.handle_timer(self.now)
+                self.pump(place)
 
     def asks(self, place: int, action: ControlAction) -> None:
         self.sessions[place].services.submit(ControlRequest(action), self.now)
