@@ -106,6 +106,11 @@ class Conversation:
         assert self.bus_up(now - 1.0) == []
         return self.activate(now)
 
+    def begun(self) -> 'Conversation':
+        """Begin, whatever is sent."""
+        self.begins()
+        return self
+
     def deactivate(self, now: float) -> list[str]:
         self.now = now
         self.session.deactivate(now)

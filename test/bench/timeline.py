@@ -4,12 +4,16 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
+from typing import TypeVar
 
 from coming import Coming
 from conversation import Conversation
 
 from drive_can_bridge.core.session import Session
 
+
+
+PairT = TypeVar('PairT', bound='Pair')
 
 
 class Timeline:
@@ -102,11 +106,12 @@ class Pair(ABC):
     def timers(self) -> None:
         self.deliver(self.talk.at(self.now))
 
-    def live(self, duration: float) -> None:
+    def live(self: PairT, duration: float) -> PairT:
         """Let time pass, every timer in time."""
         end = self.now + duration
         Coming().live(self, end, due=self.due, timers=self.timers)
         self.now = max(self.now, end)
+        return self
 
     def activate(self) -> None:
         self.deliver(self.talk.bus_up(self.now))
@@ -118,7 +123,8 @@ class Pair(ABC):
         self.live(self.session.longest_stop + 0.5 if wait is None else wait)
         assert self.session.stopped
 
-    def commands(self, *values: float) -> None:
+    def commands(self: PairT, *values: float) -> PairT:
         """Give the first setpoint these values, one after the other."""
         for value in values:
             self.talk.commands(0, value, self.now)
+        return self

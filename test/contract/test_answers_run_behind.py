@@ -80,12 +80,13 @@ class Bus:
     def arrives(self, session: Session, answer: Frame) -> None:
         session.receive_frame(answer, self.now)
 
-    def live(self, seconds: float) -> None:
+    def live(self, seconds: float) -> 'Bus':
         end = self.now + seconds
         self.coming.live(
             self, end, due=lambda: min(session.next_timer() for session in self.sessions),
             timers=self.timers, then=self.look)
         self.now = end
+        return self
 
     def timers(self) -> None:
         for session in self.sessions:
@@ -104,12 +105,13 @@ class Bus:
         assert all(device.registers.runs for device in self.devices)
         return self
 
-    def run_on(self, seconds: float) -> None:
+    def run_on(self, seconds: float) -> 'Bus':
         """Go on with commands, which grow old."""
         end = self.now + seconds
         while self.now < end:
             self.sessions[0].services.command(0, 100.0, self.now)
             self.live(min(0.1, end - self.now))
+        return self
 
     def stop(self) -> list[bool]:
         """End; return of which drives it was said that they may still be running."""
@@ -141,8 +143,7 @@ BEHIND = some([(kind, *lag) for kind in KINDS for lag in (*LAGS, *LONG_LAGS)
 def test_a_drive_that_is_deaf_from_the_stop_on_is_named(
         kind: str, period: float, delay: float) -> None:
     for place in some(range(5), 5):
-        bus = Bus(kind, period, delay).run()
-        bus.live(0.2 * place * period)
+        bus = Bus(kind, period, delay).run().live(0.2 * place * period)
         bus.deaf = set(range(len(bus.devices)))
         assert bus.stop() == [True] * len(bus.devices)
 
@@ -150,8 +151,7 @@ def test_a_drive_that_is_deaf_from_the_stop_on_is_named(
 @pytest.mark.parametrize(('kind', 'period', 'delay'), BEHIND)
 def test_a_drive_that_heard_the_stop_is_not(kind: str, period: float, delay: float) -> None:
     for place in some(range(5), 5):
-        bus = Bus(kind, period, delay).run()
-        bus.live(0.2 * place * period)
+        bus = Bus(kind, period, delay).run().live(0.2 * place * period)
         assert bus.stop() == [False] * len(bus.devices)
         assert not any(told_to_run(device) for device in bus.devices)
 
@@ -309,8 +309,7 @@ ALONE = [kind for kind in KINDS if 'group' not in kind]
 def test_what_was_held_until_a_stop_does_not_show_it(
         kind: str, period: float, limit: int, held: float, longer: float) -> None:
     for place in some(range(5), 5):
-        bus = Bus(kind, period, 0.002, limit).run()
-        bus.run_on(0.2 * place * period)
+        bus = Bus(kind, period, 0.002, limit).run().run_on(0.2 * place * period)
         bus.held_until = bus.now + held + longer
         bus.run_on(held)
         bus.deaf = {0}
@@ -321,8 +320,7 @@ def test_what_was_held_until_a_stop_does_not_show_it(
 @pytest.mark.parametrize(('held', 'longer'), [(0.25, 0.15), (0.65, 0.3), (1.5, 0.8), (1.5, 1.2)])
 def test_what_was_held_until_a_quick_stop_does_not_show_it(held: float, longer: float) -> None:
     for place in some(range(5), 5):
-        bus = Bus('29 bit, no word, maps assumed', 0.1, 0.002, 30).run()
-        bus.run_on(0.02 * place)
+        bus = Bus('29 bit, no word, maps assumed', 0.1, 0.002, 30).run().run_on(0.02 * place)
         bus.held_until = bus.now + held + longer
         bus.run_on(held)
         bus.deaf = {0}
@@ -340,8 +338,7 @@ def test_what_was_held_until_a_quick_stop_does_not_show_it(held: float, longer: 
 def test_what_was_lost_until_a_stop_is_no_doubt(
         kind: str, period: float, limit: int, lost: int) -> None:
     for place in some(range(5), 5):
-        bus = Bus(kind, period, 0.002, limit).run()
-        bus.run_on(0.2 * place * period)
+        bus = Bus(kind, period, 0.002, limit).run().run_on(0.2 * place * period)
         bus.lose = 1000
         bus.run_on(lost * period)
         bus.lose = 0
@@ -419,8 +416,7 @@ def test_at_most_one_for_each_missed_exchange(kind: str) -> None:
 @pytest.mark.parametrize('kind', ['CANnord', '29 bit, maps assumed, word in its slot'])
 def test_answers_that_were_held_are_late_however_late(
         kind: str, held: float, missed: int) -> None:
-    bus = Bus(kind, 0.1, 0.002)
-    bus.live(0.05)
+    bus = Bus(kind, 0.1, 0.002).live(0.05)
     statistics = bus.sessions[0].statistics
     bus.held_until = bus.now + held
     bus.live(held + 1.0)

@@ -304,8 +304,7 @@ def test_silence_of_the_commander_is_neutral(partner: Partner) -> None:
 
 def test_that_waits_for_no_cycle(make: type[Partner]) -> None:
     """However long the period is; one of the last command may come between."""
-    partner = make(period=1.0, command_timeout=0.3).start()
-    partner.live(3.0)
+    partner = make(period=1.0, command_timeout=0.3).start().live(3.0)
     partner.enable()
     partner.talk.commands(0, 0.0, partner.now)
     for _ in range(25):

@@ -68,8 +68,7 @@ def enabled(kind: str, **options: Any) -> Partner:
 
 def running(kind: str, **options: Any) -> Partner:
     """Return one that runs, at 100 rpm."""
-    partner = enabled(kind, **{'command_timeout': 0.0, **options})
-    partner.commands(0.0, 100.0)
+    partner = enabled(kind, **{'command_timeout': 0.0, **options}).commands(0.0, 100.0)
     partner.live(max(0.1, 2 * partner.configuration.period))
     assert partner.registers[50] == 1000
     partner.take()

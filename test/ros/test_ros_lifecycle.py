@@ -3,6 +3,7 @@
 
 from collections import Counter
 import gc
+import itertools
 from pathlib import Path
 import random
 from typing import Any
@@ -13,6 +14,7 @@ from leaks import drive_nodes, threads
 from lifecycle_msgs.msg import Transition, TransitionEvent
 import pytest
 from rcl_interfaces.srv import GetParameters, SetParameters
+from repeating import again_and_again
 from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool
 from waiting import clock, pause
@@ -258,28 +260,24 @@ def test_any_order_during_traffic(bridge: StartBridge, client: Client) -> None:
     writes = client.node.create_client(SetParameters, '/conveyor/set_parameters')
     enable = client.node.create_client(SetBool, '/lift/enable')
     futures: list[Any] = []
-    ending = clock().wake_event()
+    numbers = itertools.count(1)
 
     def traffic() -> None:
-        value = 0
-        while not ending.wait(clock().now() + 0.01):
-            value += 1
-            for publisher in commands:
-                publisher.publish(Float64(data=float(value % 3)))
-            # what a slow machine cannot answer would keep everybody's calls waiting for minutes
-            if sum(not future.done() for future in futures[-UNDER_WAY:]) == UNDER_WAY:
-                continue
-            futures.extend(
-                entry.call_async(GetParameters.Request(names=['ramp_time', 'actual_speed']))
-                for entry in reads if entry.service_is_ready())
-            if writes.service_is_ready():
-                futures.append(writes.call_async(SetParameters.Request(
-                    parameters=to_messages({'jog_speed': float(value % 100)}))))
-            if enable.service_is_ready() and value % 10 == 0:
-                futures.append(enable.call_async(SetBool.Request(data=value % 20 == 0)))
-    worker = clock().worker(traffic, 'traffic')
-    worker.start()
-    try:
+        value = next(numbers)
+        for publisher in commands:
+            publisher.publish(Float64(data=float(value % 3)))
+        # what a slow machine cannot answer would keep everybody's calls waiting for minutes
+        if sum(not future.done() for future in futures[-UNDER_WAY:]) == UNDER_WAY:
+            return
+        futures.extend(
+            entry.call_async(GetParameters.Request(names=['ramp_time', 'actual_speed']))
+            for entry in reads if entry.service_is_ready())
+        if writes.service_is_ready():
+            futures.append(writes.call_async(SetParameters.Request(
+                parameters=to_messages({'jog_speed': float(value % 100)}))))
+        if enable.service_is_ready() and value % 10 == 0:
+            futures.append(enable.call_async(SetBool.Request(data=value % 20 == 0)))
+    with again_and_again(traffic, 0.01):
         state, chance = 'unconfigured', random.Random(6)
         everything = (CONFIGURE, ACTIVATE, DEACTIVATE, CLEANUP)
         taken = Counter[str]()
@@ -298,9 +296,6 @@ def test_any_order_during_traffic(bridge: StartBridge, client: Client) -> None:
         wait_until(lambda: client.get('/conveyor', 'actual_speed') != [None])
         wait_until(lambda: any(getattr(future.result(), 'success', False)
                                for future in list(futures) if future.done()))
-    finally:
-        ending.ring()
-        worker.join()
     wait_until(lambda: client.get('/lift', 'actual_speed') != [None])
     answers = [future.result() for future in futures if future.done()]
     assert any(getattr(answer, 'success', False) for answer in answers)  # ~/enable

@@ -58,7 +58,7 @@ class Cable:
             session.activate(0.0)
         self._collect()
 
-    def run(self, seconds: float) -> None:
+    def run(self, seconds: float) -> 'Cable':
         """Let time pass."""
         until = self.now + seconds
         for _ in range(200_000):
@@ -69,7 +69,7 @@ class Cable:
                 self.now = until
                 for drive in self.drives:
                     drive.plant.advance(until)
-                return
+                return self
             self.now = max(self.now, due)
             arrived = [entry for entry in self._under_way if entry[0] <= self.now]
             self._under_way = [entry for entry in self._under_way if entry[0] > self.now]

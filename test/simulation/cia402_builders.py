@@ -131,7 +131,7 @@ class Servo:
 
     # -- a master ---------------------------------------------------------------------------------
 
-    def set_up(self, mode: int) -> None:
+    def set_up(self, mode: int) -> 'Servo':
         """Map control word and target to RPDO1, status word and position to TPDO1, and start."""
         self.mode = mode
         index, subindex, letter = TARGETS[mode]
@@ -141,6 +141,7 @@ class Servo:
         self.write(0x6060, 0, mode, 1)
         self.write(0x60C2, 1, 10, 1)
         self.ask('000#0105')
+        return self
 
     def _map(self, index: int, cob_id: int, entries: list[int]) -> None:
         self.write(index, 1, cob_id, 4)

@@ -206,8 +206,7 @@ def test_without_6007h_a_lost_master_is_told_and_the_axis_moves_on() -> None:
 
 
 def test_an_rpdo_of_type_1_counts_from_the_sync_on() -> None:
-    servo = Servo()
-    servo.set_up(9)
+    servo = Servo().set_up(9)
     assert servo.ask('205#060000000000') == []
     assert servo.read(0x6040) == 0
     answer, = servo.ask('080#')
@@ -216,8 +215,7 @@ def test_an_rpdo_of_type_1_counts_from_the_sync_on() -> None:
 
 
 def test_an_rpdo_that_is_too_short_is_ignored() -> None:
-    servo = Servo()
-    servo.set_up(9)
+    servo = Servo().set_up(9)
     assert servo.ask('205#0600') == servo.ask('080#')[1:] == []
     assert servo.read(0x6040) == 0
     assert list(servo.drive.violations.values()) == [1]
@@ -258,8 +256,7 @@ def test_a_second_node_with_its_number_is_seen() -> None:
 
 
 def test_walks_one_state_at_a_time() -> None:
-    servo = Servo()
-    servo.set_up(9)
+    servo = Servo().set_up(9)
     for word, state in (
             (0x0F, 0x40), (0x07, 0x40), (0x06, 0x21), (0x0F, 0x23), (0x0F, 0x27), (0x07, 0x23),
             (0x06, 0x21), (0x07, 0x23), (0x00, 0x40), (0x06, 0x21), (0x02, 0x40)):
@@ -269,8 +266,7 @@ def test_walks_one_state_at_a_time() -> None:
 
 
 def test_a_fault_is_reset_by_a_rising_edge_once_its_cause_is_gone() -> None:
-    servo = Servo()
-    servo.set_up(9)
+    servo = Servo().set_up(9)
     servo.target = 100_000
     servo.enable()
     servo.run(0.5)
@@ -317,8 +313,7 @@ def test_sto_low_lets_no_torque_be() -> None:
 
 
 def test_a_step_in_csp_is_a_fault() -> None:
-    servo = Servo()
-    servo.set_up(8)
+    servo = Servo().set_up(8)
     servo.target = 0
     servo.write(0x6065, 0, 5000, 4)
     servo.enable()
@@ -330,8 +325,7 @@ def test_a_step_in_csp_is_a_fault() -> None:
 
 
 def test_pp_takes_targets_by_bit_4() -> None:
-    servo = Servo()
-    servo.set_up(1)
+    servo = Servo().set_up(1)
     servo.target = 50_000
     servo.enable()
     assert servo.run(0.5) == (0x0637, BEGINNING)
@@ -359,8 +353,7 @@ def test_pp_takes_targets_by_bit_4() -> None:
 @pytest.mark.parametrize(('method', 'status', 'position'), [
     (35, 0x1637, 0), (37, 0x1637, 0), (17, 0x1637, 0), (33, 0x1637, 0), (0, 0x2237, BEGINNING)])
 def test_homing(method: int, status: int, position: int) -> None:
-    servo = Servo()
-    servo.set_up(6)
+    servo = Servo().set_up(6)
     servo.write(0x6098, 0, method, 1)
     servo.enable()
     assert servo.run(0.5) == (0x0237, BEGINNING)            # not by itself
@@ -374,8 +367,7 @@ def test_homing(method: int, status: int, position: int) -> None:
 
 def running(mode: int = 9, **options: Any) -> Servo:
     """Return a drive at 10 revolutions per second."""
-    servo = Servo(**options)
-    servo.set_up(mode)
+    servo = Servo(**options).set_up(mode)
     servo.write(0x6084, 0, 100_000, 4)          # 10 rev/s²: 1 s
     servo.target = 100_000
     servo.enable()
@@ -429,8 +421,7 @@ def test_quick_stop(option: int, seconds: float, state: int) -> None:
 
 
 def test_some_drives_leave_quick_stop_by_0000h_only() -> None:
-    servo = Servo(habits=Habits(leaves_quick_stop=False, stand_bit=False))
-    servo.set_up(9)
+    servo = Servo(habits=Habits(leaves_quick_stop=False, stand_bit=False)).set_up(9)
     servo.write(0x605A, 0, 6, 2)
     servo.enable()
     servo.word = 0x02

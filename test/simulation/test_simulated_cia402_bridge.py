@@ -41,8 +41,7 @@ def slow(drive: SimulatedServoDrive) -> None:
 
 @pytest.mark.parametrize('keys', [{}, CSP, PV, {**PV, 'transmission': 'event'}])
 def test_comes_online_without_power_and_enables_once_it_is_there(keys: dict[str, Any]) -> None:
-    cable = Cable(configuration(**keys), prepare=lambda drive: drive.fault('sto', 0.0))
-    cable.run(1.0)
+    cable = Cable(configuration(**keys), prepare=lambda drive: drive.fault('sto', 0.0)).run(1.0)
     assert cable.sessions[0].online, cable.told()
     assert cable.samples
     success, message = cable.control(ControlAction.ENABLE)
@@ -56,8 +55,7 @@ def test_comes_online_without_power_and_enables_once_it_is_there(keys: dict[str,
 
 
 def test_an_axis_stays_where_it_is_whatever_happens() -> None:
-    cable = Cable(configuration(**CSP))
-    cable.run(1.0)
+    cable = Cable(configuration(**CSP)).run(1.0)
     drive = cable.drives[0]
     assert cable.control(ControlAction.ENABLE)[0]
     cable.run(1.0)
@@ -107,8 +105,7 @@ def test_an_axis_stays_where_it_is_whatever_happens() -> None:
     (Habits(start=0.5), {}, True),
     (Habits(mode_shown_early=False), {}, True)])
 def test_makers_differ(habits: Habits, keys: dict[str, Any], online: bool) -> None:
-    cable = Cable(configuration(**keys), habits=habits)
-    cable.run(2.0)
+    cable = Cable(configuration(**keys), habits=habits).run(2.0)
     assert cable.sessions[0].online is online, cable.told()
     if online:
         assert cable.control(ControlAction.ENABLE)[0]
@@ -128,8 +125,7 @@ def test_makers_differ(habits: Habits, keys: dict[str, Any], online: bool) -> No
 def test_makers_leave_out_objects(taken: list[Any], keys: dict[str, Any], online: bool,
                                   told: str, habits: Habits) -> None:
     cable = Cable(configuration(**keys), habits=habits,
-                  prepare=lambda drive: drive.take_away(taken))
-    cable.run(2.0)
+                  prepare=lambda drive: drive.take_away(taken)).run(2.0)
     assert cable.sessions[0].online is online, cable.told()
     assert told in str(cable.told())
     if online:
@@ -173,8 +169,7 @@ def test_a_killed_bridge_is_missed_and_the_drive_stops() -> None:
     (2, '', 'switch on disabled'), (6, 'quick stop active, holds', 'quick stop active')])
 def test_quick_stop(option: int, message: str, state: str) -> None:
     cable = Cable(configuration(**CSP), load=0.3,
-                  prepare=lambda drive: drive.set_value('quick_stop_option', option))
-    cable.run(1.0)
+                  prepare=lambda drive: drive.set_value('quick_stop_option', option)).run(1.0)
     assert cable.control(ControlAction.ENABLE)[0]
     cable.run(0.5)
     shaft = cable.drives[0].plant.shaft
@@ -240,8 +235,7 @@ def test_homing_by_request_only(method: int, offset: float, shown: int, moved: b
     ('vl', 'vl_target_velocity', 600.0, 10.0), ('tq', 'target_torque', 8.0, 5.0),
     ('cst', 'target_torque', 8.0, 5.0)])
 def test_modes_of_speed_and_torque(mode: str, setpoint: str, value: float, speed: float) -> None:
-    cable = Cable(configuration(mode=mode, request=(setpoint,)))
-    cable.run(1.0)
+    cable = Cable(configuration(mode=mode, request=(setpoint,))).run(1.0)
     assert cable.control(ControlAction.ENABLE)[0]
     cable.command(0.0)
     assert cable.speed == 0.0

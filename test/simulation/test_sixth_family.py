@@ -123,8 +123,7 @@ def cable(monkeypatch: pytest.MonkeyPatch) -> Cable:
     monkeypatch.setitem(FAMILIES, 'toy', Toy())
     monkeypatch.setitem(SIMULATED_DRIVES, 'toy', SimulatedToy)
     made = Cable(drive('toy', station=5, table=(SPEED, ACTUAL, GAIN, ONE), request=(SPEED,),
-                       response=(ACTUAL,)))
-    made.run(0.5)
+                       response=(ACTUAL,))).run(0.5)
     assert made.found(StationFound)
     return made
 

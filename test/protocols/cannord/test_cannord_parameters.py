@@ -417,8 +417,7 @@ def test_raw_names_of_listed_parameters_obey_their_rules() -> None:
 
 
 def monitored(**options: Any) -> tuple[Conversation, list[str]]:
-    talk = Conversation(inverter(table=(FREQUENCY, ACTUAL, MONITORING), **options))
-    talk.begins()
+    talk = Conversation(inverter(table=(FREQUENCY, ACTUAL, MONITORING), **options)).begun()
     talk.at(10.0)
     return talk, talk.hears('003#310B0000', 10.002)
 

@@ -41,8 +41,7 @@ class TestObjects:
     @pytest.mark.parametrize('make', [AcceptsAnything, ChecksMapping])
     @pytest.mark.parametrize('mapping', ['configure', 'verify'])
     def test_one_that_the_drive_lacks(self, make: Any, mapping: str) -> None:
-        axis = limited(make, None, mapping=mapping).start()
-        axis.live(3.0)
+        axis = limited(make, None, mapping=mapping).start().live(3.0)
         assert found_differing(axis) == says(
             'of_object', what='torque_limit (6072h.00h)', why=says('no_such_object'))
         assert 'torque_limit (6072h.00h): no such object' in axis.session.offline_advice
@@ -163,8 +162,7 @@ class TestLimits:
         assert axis.drive.objects[LIMIT] == (500).to_bytes(2, 'little')
 
     def test_found_while_it_is_enabled(self) -> None:
-        axis = limited(DropsLimit).enabled()
-        axis.commands(0.0, 100.0)
+        axis = limited(DropsLimit).enabled().commands(0.0, 100.0)
         axis.live(0.1)
         assert axis.session.state is DriveState.ONLINE
         bounds(axis, 30.0)

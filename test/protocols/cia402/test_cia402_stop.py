@@ -321,8 +321,7 @@ class TestLosses:
 
     @pytest.mark.parametrize('timeout', [0.31, 0.35, 0.45, 0.5])
     def test_so_does_one_whose_heartbeats_are_missed_meanwhile(self, timeout: float) -> None:
-        axis = Axis('pv', period=0.1, heartbeat_timeout=timeout).enabled()
-        axis.commands(0.0, 100.0)
+        axis = Axis('pv', period=0.1, heartbeat_timeout=timeout).enabled().commands(0.0, 100.0)
         axis.live(0.35)
         axis.take()
         axis.talk.events()

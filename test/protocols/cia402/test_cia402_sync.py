@@ -52,10 +52,11 @@ class Bus:
             self.pump(place)
         return self
 
-    def live(self, duration: float) -> None:
+    def live(self, duration: float) -> 'Bus':
         end = self.now + duration
         self.coming.live(self, end, due=lambda: min(self.due), timers=self.timers)
         self.now = end
+        return self
 
     def arrives(self, answer: Frame) -> None:
         for place, session in enumerate(self.sessions):
@@ -97,8 +98,7 @@ def online(of: Bus) -> list[bool]:
 class TestRounds:
 
     def test_all_rpdos_then_sync_once_a_period(self) -> None:
-        one = bus().start()
-        one.live(0.5)
+        one = bus().start().live(0.5)
         assert online(one) == [True] * 3
         one.rounds()
         before = one.now
@@ -108,8 +108,7 @@ class TestRounds:
         assert {round(later - at, 5) for at, later in zip(syncs, syncs[1:])} == {0.01}
 
     def test_one_that_comes_later_joins(self) -> None:
-        one = bus().start(0, 2)
-        one.live(0.5)
+        one = bus().start(0, 2).live(0.5)
         one.rounds()
         one.start(1)
         one.live(0.5)
@@ -120,8 +119,7 @@ class TestRounds:
         assert {each[0] for each in rounds} == {'201'}
 
     def test_one_that_is_lost_leaves_the_others_in_peace(self) -> None:
-        one = bus().start()
-        one.live(0.5)
+        one = bus().start().live(0.5)
         takes, one.drives[3].takes = one.drives[3].takes, lambda sent: []  # type: ignore
         one.rounds()
         one.live(1.0)
@@ -134,8 +132,7 @@ class TestRounds:
         assert online(one) == [True] * 3
 
     def test_a_stop_waits_for_the_next_sync_in_time(self) -> None:
-        one = bus(period=0.02).start()
-        one.live(0.5)
+        one = bus(period=0.02).start().live(0.5)
         one.asks(1, ControlAction.ENABLE)
         one.live(0.5)
         one.live(0.012)
@@ -148,8 +145,7 @@ class TestRounds:
     # s; the longest wait is 0.02 s
     @pytest.mark.parametrize(('period', 'since_the_last'), [(0.2, 0.1), (0.05, 0.01)])
     def test_or_brings_a_whole_round_forward(self, period: float, since_the_last: float) -> None:
-        one = bus(period=period).start()
-        one.live(2.0)
+        one = bus(period=period).start().live(2.0)
         for place in (0, 1, 2):
             one.asks(place, ControlAction.ENABLE)
         one.live(2.0)
@@ -174,8 +170,7 @@ class TestRounds:
     @pytest.mark.parametrize('period', [0.5, 2.0])
     def test_cycles_of_a_stop_are_close_together_however_long_the_period_is(
             self, period: float) -> None:
-        one = bus(2, period=period, control_timeout=0.5).start()
-        one.live(3 * period)
+        one = bus(2, period=period, control_timeout=0.5).start().live(3 * period)
         assert online(one) == [True] * 2
         one.log.clear()
         for place, session in enumerate(one.sessions):
@@ -190,8 +185,7 @@ class TestRounds:
 
     @pytest.mark.parametrize('period', [0.01, 0.5, 2.0])
     def test_drives_that_fall_silent_together_get_theirs_as_soon(self, period: float) -> None:
-        one = bus(2, period=period, control_timeout=0.5).start()
-        one.live(3 * period + 0.5)
+        one = bus(2, period=period, control_timeout=0.5).start().live(3 * period + 0.5)
         for place in (0, 1):
             one.asks(place, ControlAction.ENABLE)
         one.live(2.0)
@@ -216,8 +210,7 @@ class TestRounds:
 
     @pytest.mark.parametrize('place', [0, 1])
     def test_one_that_is_lost_when_another_one_stops(self, place: int) -> None:
-        one = bus(period=0.5).start()
-        one.live(2.2)
+        one = bus(period=0.5).start().live(2.2)
         one.drives[3].takes = lambda sent: []   # type: ignore[method-assign]
         one.live(0.6)
         one.log.clear()
@@ -228,8 +221,7 @@ class TestRounds:
         self.rpdos_and_sync_are_together(one)
 
     def test_one_that_restarts_in_the_middle_of_a_round_that_it_has_brought_forward(self) -> None:
-        one = bus(2, period=0.2).start()
-        one.live(1.3)
+        one = bus(2, period=0.2).start().live(1.3)
         one.asks(1, ControlAction.ENABLE)
         one.live(1.02)
         one.log.clear()
@@ -254,8 +246,7 @@ class TestRounds:
 
     @pytest.mark.parametrize('place', [0, 1, 2])
     def test_so_are_those_of_one_drive_and_all_others_come_along(self, place: int) -> None:
-        one = bus(period=0.5).start()
-        one.live(2.2)
+        one = bus(period=0.5).start().live(2.2)
         one.asks(place, ControlAction.ENABLE)
         one.live(3.0)
         assert one.drives[place + 1].state == ServoDrive.ENABLED
@@ -279,8 +270,7 @@ class TestRounds:
 
     def test_nor_does_one_that_is_lost_bring_a_round_of_its_own(self) -> None:
         """The last of a round."""
-        one = bus(2, period=0.5).start()
-        one.live(2.0)
+        one = bus(2, period=0.5).start().live(2.0)
         one.drives[2].takes = lambda sent: []   # type: ignore[method-assign]
         one.log.clear()
         one.live(4.0)
@@ -290,8 +280,7 @@ class TestRounds:
 
     def test_a_round_brought_forward_costs_no_axis_its_answer(self) -> None:
         """TPDOs come 8 ms behind SYNC, as on a slow bus, and a quick stop 2 ms behind it."""
-        one = bus(period=0.1, missed_limit=1).start()
-        one.live(2.0)
+        one = bus(period=0.1, missed_limit=1).start().live(2.0)
         for place in (0, 1, 2):
             one.asks(place, ControlAction.ENABLE)
         one.live(2.0)
@@ -310,8 +299,7 @@ class TestRounds:
 
     def test_a_process_that_is_late_between_two_drives(self) -> None:
         """One leaves a cycle out, the other does not: they stay in step all the same."""
-        one = bus().start()
-        one.live(0.5)
+        one = bus().start().live(0.5)
         one.rounds()
         act, delays = one.sessions[0].handle_timer, [0.0149, 0.0151, 0.0049, 0.0051]
 
@@ -348,8 +336,7 @@ class TestRounds:
 
     def test_one_heartbeat_for_all_the_smallest(self) -> None:
         one = Bus(*(servo('pv', name=f'axis_{station}', station=station, bridge_heartbeat=beat)
-                    for station, beat in ((1, 0.5), (2, 0.1), (3, 0.3)))).start()
-        one.live(2.0)
+                    for station, beat in ((1, 0.5), (2, 0.1), (3, 0.3)))).start().live(2.0)
         beats = [at for at, text in one.log if text == '77F#05']
         assert {round(later - at, 3) for at, later in zip(beats, beats[1:])} == {0.1}
         for station, limit in ((1, 1500), (2, 300), (3, 900)):
@@ -358,8 +345,7 @@ class TestRounds:
     def test_it_beats_as_the_node_that_those_know_who_are_to_hear_it(self) -> None:
         one = Bus(*(servo('pv', name=f'axis_{station}', station=station, bridge_heartbeat=beat,
                           bridge_node=node)
-                    for station, beat, node in ((1, 0.0, 100), (2, 0.1, 126)))).start()
-        one.live(1.0)
+                    for station, beat, node in ((1, 0.0, 100), (2, 0.1, 126)))).start().live(1.0)
         assert {text for _, text in one.log if text.endswith('#05')} == {'77E#05'}
         assert one.drives[2].number(0x1016, 1) == 126 << 16 | 300
 
@@ -396,8 +382,7 @@ class TestTheFirst:
         assert online(one) == [True, False, True]
 
     def test_it_does_not_pause_when_all_are_lost_and_found(self) -> None:
-        one = bus().start()
-        one.live(0.5)
+        one = bus().start().live(0.5)
         for drive in one.drives.values():
             drive.operational = False
         one.live(3.0)
@@ -407,8 +392,7 @@ class TestTheFirst:
         assert min(later - at for at, later in zip(syncs, syncs[1:])) > 0.005
 
     def test_they_end_together(self) -> None:
-        one = bus().start()
-        one.live(0.5)
+        one = bus().start().live(0.5)
         one.log.clear()
         for place, session in enumerate(one.sessions):
             session.deactivate(one.now)

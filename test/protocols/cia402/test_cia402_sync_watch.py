@@ -105,8 +105,7 @@ class TestBetweenRounds:
         assert times(axis, '080#')[-1] == last
 
     def test_it_goes_on_while_a_drive_differs(self) -> None:
-        axis = Axis(objects={(0x6502, 0): bytes(4)}).start()
-        axis.live(2.0)
+        axis = Axis(objects={(0x6502, 0): bytes(4)}).start().live(2.0)
         assert len(times(axis, '080#')) > 200
 
     def test_and_ends_a_second_after_the_last_was_heard(self) -> None:
@@ -137,8 +136,7 @@ class TestBetweenRounds:
 
     def test_none_by_event(self) -> None:
         axis = Axis('pv', transmission='event', objects={
-            (0x1800, 3): bytes(2), (0x1800, 5): bytes(2)}).start()
-        axis.live(2.0)
+            (0x1800, 3): bytes(2), (0x1800, 5): bytes(2)}).start().live(2.0)
         assert '080#' not in axis.take()
 
     def test_around_an_nmt_start_while_nobody_is_heard(self) -> None:
@@ -183,8 +181,7 @@ class TestBeforeTheFirst:
         ServoDrive.ENABLED, ServoDrive.ON, ServoDrive.READY, ServoDrive.OFF])
     def test_one_that_has_yet_to_obey_a_bridge_that_died(self, state: int, mapping: str) -> None:
         """The RPDO came, and its SYNC did not: 000Fh, by which many go on from ready as well."""
-        before = Axis('pv').enabled()
-        before.commands(0.0, 100.0)
+        before = Axis('pv').enabled().commands(0.0, 100.0)
         before.live(0.05)
         drive = before.drive
         before.deliver([text for text in sent(before) if text.startswith('205#0F00')][-1:])
@@ -221,8 +218,7 @@ class TestStartsSlowly:
     @pytest.mark.parametrize('beats', [True, False])
     @pytest.mark.parametrize('mode', ['csv', 'pv'])
     def test_it_comes_online(self, mode: str, beats: bool) -> None:
-        axis = Axis(mode, make=StartsSlowly, **({} if beats else MUTE)).start()
-        axis.live(0.5)
+        axis = Axis(mode, make=StartsSlowly, **({} if beats else MUTE)).start().live(0.5)
         assert axis.session.online
         assert len(times(axis, '000#0105')) == len(times(axis, '000#8005')) == 1
         if beats:

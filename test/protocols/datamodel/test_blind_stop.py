@@ -32,8 +32,7 @@ def running(**options: object) -> Conversation:
     """Return a drive that was told 100 rpm, which it cannot be asked for."""
     talk = Conversation(drive(
         'datamodel_standard', table=BLIND_TABLE, rearm_immediate=True, command_timeout=0.0,
-        **{'request': (BLIND_SPEED,), **options}))
-    talk.begins()
+        **{'request': (BLIND_SPEED,), **options})).begun()
     talk.served(10.03, well)
     talk.commands(0, 100.0, 10.03)
     talk.served(10.055, well)

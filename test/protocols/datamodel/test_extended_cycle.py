@@ -36,8 +36,7 @@ def test_age_of_a_frame_counts_for_stamp_and_latency_only() -> None:
 
 
 def test_unasked_answer_before_the_first_cycle() -> None:
-    talk = Conversation(drive())
-    talk.begins()
+    talk = Conversation(drive()).begun()
     talk.hears(ANSWER, 10.0005)
     assert talk.events() == [FrameRejected(says('unasked', what='cyclic response'))]
     assert not talk.session.online
@@ -81,8 +80,7 @@ def test_after_a_response_without_a_whole_word_the_real_one_may_still_come() -> 
 
 
 def test_strict_policy_holds_for_acyclic_answers_too() -> None:
-    talk = Conversation(drive(length_policy='strict'))
-    talk.begins()
+    talk = Conversation(drive(length_policy='strict')).begun()
     assert talk.hears('102007A4#00320033000000', 10.001) == []
     assert len(talk.events(FrameRejected)) == 1
     assert talk.hears(REQUEST_MAP, 10.002) == [ASK_RESPONSE_MAP]
@@ -161,8 +159,7 @@ def test_what_nobody_asked_for_is_counted_and_leaves_no_trace(text: str) -> None
     '102007A4#00320033000000',       # too short
 ])
 def test_answer_that_does_not_match_the_question(text: str) -> None:
-    talk = Conversation(drive())
-    talk.begins()
+    talk = Conversation(drive()).begun()
     assert talk.hears(text, 10.001) == []
     assert talk.session.statistics.rejected == 1
     assert talk.hears(REQUEST_MAP, 10.002) == [ASK_RESPONSE_MAP]

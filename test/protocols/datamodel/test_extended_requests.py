@@ -64,8 +64,7 @@ def test_time_out(retries: int, timeout: float, text: str) -> None:
 
 
 def test_offline_drive_that_answers_anyway() -> None:
-    talk = Conversation(drive(parameter_retries=0, mapping='assume', period=10.0))
-    talk.begins()
+    talk = Conversation(drive(parameter_retries=0, mapping='assume', period=10.0)).begun()
     talk.at(10.0)
     talk.submits(read(GAIN, RAMP), 16.0)
     assert talk.hears('102001E1#0005000000000000', 16.001) == [ASK_GAIN]

@@ -164,8 +164,7 @@ def test_a_gap_is_bridged_over_listed_parameters() -> None:
 
 
 def polling_of(**options: object) -> list[str]:
-    talk = Conversation(drive('datamodel_standard', **options))
-    talk.begins()
+    talk = Conversation(drive('datamodel_standard', **options)).begun()
     return talk.at(10.0)
 
 
@@ -619,16 +618,14 @@ def test_a_stop_does_not_wait_for_the_status(action: ControlAction, word: str,
 
 def test_addresses_with_other_bases() -> None:
     talk = Conversation(drive(
-        'datamodel_standard', station=20, request_id_base=0x300, response_id_base=0x380))
-    talk.begins()
+        'datamodel_standard', station=20, request_id_base=0x300, response_id_base=0x380)).begun()
     assert talk.at(10.0) == ['314#03D1000300000000']
     talk.hears('394#E803FA0001000000', 10.002)
     assert talk.samples() == [(1000, 250, 1)]
 
 
 def test_an_offset_moves_every_number() -> None:
-    talk = Conversation(drive('datamodel_standard', parameter_offset=-1))
-    talk.begins()
+    talk = Conversation(drive('datamodel_standard', parameter_offset=-1)).begun()
     assert talk.at(10.0) == ['3F1#03D0000300000000']
     talk.hears(ANSWER, 10.002)
     assert [text for _, text in talk.until(10.01)] == [

@@ -45,8 +45,7 @@ def lost(word: Parameter = WORD, *, end: float = 12.0, **options: object) -> Con
     table = tuple(word if entry is WORD else entry for entry in TABLE)
     talk = Conversation(drive(
         'datamodel_standard', response=(GAIN, ACTUAL, CURRENT, STATUS), rearm_immediate=True,
-        command_timeout=0.0, period=0.1, table=table, **options))
-    talk.begins()
+        command_timeout=0.0, period=0.1, table=table, **options)).begun()
     talk.served(10.09, well(1).get)
     assert talk.session.online
     if talk.session.control is not None:
