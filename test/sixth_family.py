@@ -254,9 +254,6 @@ class ToyScanner(Scanner):
         elif frame.identifier - station == REPLY:
             self._answer(station, 'answers', now, certainty=Certainty.CERTAIN)
 
-    def receive_request(self, frame: Frame, now: float) -> None:
-        self.receive(frame, now)
-
     def settings(self, station: int) -> dict[str, Any]:
         return {'response_numbers': [1], 'volume': 4}
 

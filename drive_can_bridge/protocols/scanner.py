@@ -97,7 +97,7 @@ class Scanner(ABC):
 
     def receive_request(self, frame: Frame, now: float) -> None:
         """Note a request, where answers are only known by what was asked."""
-        return
+        self.receive(frame, now)
 
     def take_question(self) -> Frame | None:
         """Return the next question; answers may bring further ones."""

@@ -39,9 +39,6 @@ class CannordScanner(Scanner):
         self._questions += [Frame(identifier(MessageObject.PARAMETER_TASK, address), data, False)
                             for address in range(ADDRESS_MAX + 1)]
 
-    def receive_request(self, frame: Frame, now: float) -> None:
-        self.receive(frame, now)
-
     def receive(self, frame: Frame, now: float) -> None:
         found = None if frame.extended else decode_identifier(frame.identifier)
         if found is None:
