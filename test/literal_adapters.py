@@ -173,6 +173,38 @@ class WeAct(Usbtin):
     version = b'V1.0.0.6\r'
 
 
+class Canable25(Usbtin):
+    """
+    CANable, firmware 2.5 of ElmueSoft 3c94657 (source).
+
+    ``C`` is never answered, an empty line by CR. What follows the data of a frame is refused. A
+    line of more than 165 characters begins again at its start.
+    """
+
+    size = 165
+    sent = {'t': b'\r', 'T': b'\r'}
+    version = b'+Board: Multiboard\tSlcan: 101\r'
+    rates = '0123456789'
+
+    def take_byte(self, byte: int) -> bytes:
+        if byte != 0x0D and len(self._line) >= self.size:
+            self._line = ''
+        return super().take_byte(byte)
+
+    def _obey(self, line: str) -> bytes:
+        if line == 'C':
+            self.channel_open = False
+            return b''
+        length = {'t': 5, 'T': 10}.get(line[:1])
+        if length is None and line[:1] != 'S':
+            length = 1
+        elif length is not None and line[length - 1:length].isdecimal():
+            length += 2 * int(line[length - 1])
+        if line and len(line) != (length or 2):
+            return self.refused
+        return super()._obey(line) if line else self.done
+
+
 class Esp32(Firmware):
     """
     ESP32-SLCAN, mintynet f1f6b22 (source).

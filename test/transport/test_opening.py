@@ -12,7 +12,7 @@ import socket
 
 from clocks import REAL
 from literal_adapters import (
-    Attached, Canable, Canable2, Esp32, Firmware, Lawicel, Usbtin, WeAct,
+    Attached, Canable, Canable2, Canable25, Esp32, Firmware, Lawicel, Usbtin, WeAct,
 )
 import pytest
 
@@ -20,7 +20,7 @@ from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.transport.port import open_port, Port
 
-FIRMWARES = (Canable, Canable2, Usbtin, Lawicel, WeAct, Esp32)
+FIRMWARES = (Canable, Canable2, Canable25, Usbtin, Lawicel, WeAct, Esp32)
 #: what they do with a whole line that lacks only its end (docs/safety.md)
 NOT_LOOKING_AT_THE_REST = (Usbtin, Lawicel, WeAct)
 #: an enabled servo at 10,000; a cycle of DataModel with 300 rpm; what opens

@@ -19,7 +19,7 @@ from typing import Any
 
 import can
 from clocks import HandClock, REAL
-from literal_adapters import Attached, Canable, Esp32, Firmware, Lawicel, Usbtin
+from literal_adapters import Attached, Canable, Canable25, Esp32, Firmware, Lawicel, Usbtin
 import pytest
 
 from drive_can_bridge.core import complaints
@@ -697,11 +697,20 @@ class DoesNotOpen(Usbtin):
         return super().take(data.replace(b'O', b'X'))
 
 
+class Canable25Refuses(Canable25):
+    """Does not answer ``C`` either: as ``L``, which is another command there."""
+
+    def _obey(self, line: str) -> bytes:
+        return self.refused if line == 'O' else super()._obey(line)
+
+
 @pytest.mark.usefixtures('threads')
 @pytest.mark.parametrize(('firmware', 'bitrate', 'why'), [
     (Usbtin, 125_000, ''), (Lawicel, 125_000, ''), (Canable, 125_000, ''), (Esp32, 125_000, ''),
-    (Usbtin, 800_000, ''), (Usbtin, 83_300, 'the adapter refuses bit rate 83300'),
+    (Canable25, 125_000, ''), (Usbtin, 800_000, ''),
+    (Usbtin, 83_300, 'the adapter refuses bit rate 83300'),
     (Esp32, 50_000, 'the adapter refuses bit rate 50000'),
+    (Canable25Refuses, 125_000, 'the adapter does not open'),
     (DoesNotOpen, 125_000, 'the adapter does not open')])
 def test_adapters_are_believed(firmware: type[Firmware], bitrate: int, why: str) -> None:
     adapter = firmware()
