@@ -7,6 +7,7 @@ import pytest
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.families import make_sessions
 
 
@@ -21,9 +22,23 @@ def started(family: str, **options: object) -> Partner:
     return partner
 
 
+@pytest.fixture(name='partner')
+def _partner(family: str) -> Partner:
+    return started(family)
+
+
 def told(partner: Partner) -> dict[str, int | None]:
     sent = partner.talk.session.sent
     return dict(zip((parameter.name for parameter in sent.parameters), sent.raws))
+
+
+def commanded(partner: Partner) -> Session:
+    """Enable it, and command -150 rpm; return the session."""
+    partner.enable()
+    session = partner.session
+    session.setpoints.items[0].armed = True
+    session.services.command(0, -150.0, partner.now)
+    return session
 
 
 def word(partner: Partner, name: str) -> dict[str, int]:
@@ -39,16 +54,12 @@ def test_nothing_was_sent_at_first(family: str) -> None:
     assert set(told(partner).values()) == {None}
 
 
-def test_setpoints_as_the_drive_got_them(family: str) -> None:
-    partner = started(family)
+def test_setpoints_as_the_drive_got_them(partner: Partner) -> None:
     assert told(partner) == {**word(partner, 'disable'), 'speed_setpoint': 0}
     same = partner.talk.session.sent.raws
     partner.live(0.1)
     assert partner.talk.session.sent.raws is same, 'nothing changed'
-    partner.enable()
-    session = partner.talk.session
-    session.setpoints.items[0].armed = True
-    session.services.command(0, -150.0, partner.now)
+    commanded(partner)
     assert told(partner)['speed_setpoint'] == 0, 'commanded, not sent'
     partner.take()
     partner.live(0.1)
@@ -58,12 +69,8 @@ def test_setpoints_as_the_drive_got_them(family: str) -> None:
     assert told(partner) == {**word(partner, 'disable'), 'speed_setpoint': 0}
 
 
-def test_what_the_bus_refused_was_not_sent(family: str) -> None:
-    partner = started(family)
-    session = partner.talk.session
-    partner.enable()
-    session.setpoints.items[0].armed = True
-    session.services.command(0, -150.0, partner.now)
+def test_what_the_bus_refused_was_not_sent(partner: Partner) -> None:
+    session = commanded(partner)
     partner.talk.refusing = lambda text: bool(partner.setpoints(text))
     partner.live(0.03)     # no longer than the drive may be missed
     assert told(partner)['speed_setpoint'] == 0
@@ -73,13 +80,9 @@ def test_what_the_bus_refused_was_not_sent(family: str) -> None:
     assert told(partner)['speed_setpoint'] == -1500
 
 
-def test_a_stop_that_is_told_when_the_bus_is_back(family: str) -> None:
+def test_a_stop_that_is_told_when_the_bus_is_back(partner: Partner) -> None:
     """By whatever way a family has for it; nobody answers."""
-    partner = started(family)
-    partner.enable()
-    session = partner.talk.session
-    session.setpoints.items[0].armed = True
-    session.services.command(0, -150.0, partner.now)
+    session = commanded(partner)
     partner.live(0.1)
     assert told(partner) == {**word(partner, 'enable'), 'speed_setpoint': -1500}
     partner.deliver(partner.talk.bus_down(partner.now))
@@ -117,8 +120,7 @@ def test_control_word_with_and_without_a_slot(family: str, request_: tuple[Param
     assert told(partner)['control_word'] == 2
 
 
-def test_activation_begins_anew(family: str) -> None:
-    partner = started(family)
+def test_activation_begins_anew(partner: Partner) -> None:
     partner.ends(1.0)
     partner.deliver(partner.talk.bus_down(partner.now))
     partner.deliver(partner.talk.activate(partner.now))

@@ -34,18 +34,20 @@ def limits(partner: Partner, value: float) -> CommandOutcome:
     return partner.talk.commands(1, value, partner.now)
 
 
-@pytest.mark.parametrize(('name', 'control'), KINDS)
+@pytest.fixture(params=KINDS, name='partner')
+def _partner(request: pytest.FixtureRequest) -> Partner:
+    name, control = request.param
+    return meet(name, control=control)
+
+
 class TestInEveryState:
 
-    def test_it_begins_with_neutral_and_needs_no_arming(self, name: str, control: Any) -> None:
-        partner = meet(name, control=control)
+    def test_it_begins_with_neutral_and_needs_no_arming(self, partner: Partner) -> None:
         assert partner.registers[51] == 1000
         waiting = partner.talk.session.setpoints.waiting
         assert [setpoint.parameter for setpoint in waiting] == [partner.own(SPEED)]
 
-    def test_commands_are_taken_while_nothing_is_armed_or_enabled(self, name: str,
-                                                                  control: Any) -> None:
-        partner = meet(name, control=control)
+    def test_commands_are_taken_while_nothing_is_armed_or_enabled(self, partner: Partner) -> None:
         assert limits(partner, 30.0) is CommandOutcome.ACCEPTED
         partner.live(0.1)
         assert partner.registers[51] == 300
@@ -53,9 +55,7 @@ class TestInEveryState:
         assert partner.talk.session.state in (DriveState.NOT_ARMED, DriveState.DISABLED)
         assert partner.talk.session.setpoints.ignored_at == -math.inf
 
-    def test_the_last_one_stands_and_is_not_written_by_a_stop(self, name: str,
-                                                              control: Any) -> None:
-        partner = meet(name, control=control)
+    def test_the_last_one_stands_and_is_not_written_by_a_stop(self, partner: Partner) -> None:
         limits(partner, 30.0)
         partner.live(3.0)
         assert partner.registers[51] == 300
@@ -64,8 +64,7 @@ class TestInEveryState:
         partner.ends(1.0)
         assert partner.registers[51] == 300
 
-    def test_the_next_activation_begins_with_neutral(self, name: str, control: Any) -> None:
-        partner = meet(name, control=control)
+    def test_the_next_activation_begins_with_neutral(self, partner: Partner) -> None:
         limits(partner, 30.0)
         partner.live(0.1)
         partner.ends(1.0)
@@ -74,8 +73,7 @@ class TestInEveryState:
         partner.live(0.3)
         assert partner.registers[51] == 1000
 
-    def test_after_a_loss_the_last_one_is_sent(self, name: str, control: Any) -> None:
-        partner = meet(name, control=control)
+    def test_after_a_loss_the_last_one_is_sent(self, partner: Partner) -> None:
         partner.deaf = True
         partner.live(1.0)
         assert len(partner.talk.events(StationLost)) == 1
@@ -89,8 +87,7 @@ class TestInEveryState:
         assert partner.talk.session.online
         assert partner.registers[51] == 400
 
-    def test_it_is_no_part_of_what_a_drive_runs_by(self, name: str, control: Any) -> None:
-        partner = meet(name, control=control)
+    def test_it_is_no_part_of_what_a_drive_runs_by(self, partner: Partner) -> None:
         limits(partner, 30.0)
         partner.live(0.1)
         session = partner.talk.session
@@ -98,16 +95,14 @@ class TestInEveryState:
         assert session.setpoints.at_rest
 
     @pytest.mark.parametrize('value', [30.0, 100.0, 50.0])
-    def test_old_commands_change_nothing(self, name: str, control: Any, value: float) -> None:
+    def test_old_commands_change_nothing(self, partner: Partner, value: float) -> None:
         """Not even one that equals neutral."""
-        partner = meet(name, control=control)
         limits(partner, 30.0)
         partner.talk.session.setpoints.old_command(1, value)
         partner.live(0.1)
         assert partner.registers[51] == 300
 
-    def test_a_value_that_cannot_be_sent_changes_nothing(self, name: str, control: Any) -> None:
-        partner = meet(name, control=control)
+    def test_a_value_that_cannot_be_sent_changes_nothing(self, partner: Partner) -> None:
         limits(partner, 30.0)
         with pytest.raises(ValueRefused):
             limits(partner, 300.1)

@@ -54,10 +54,8 @@ def states(bridge: Any, *names: str) -> list[str]:
 
 
 def test_stop_stops_every_drive_of_every_bridge(bridge: StartBridge, run: Run) -> None:
-    one = bridge(parameters(lift=LIFT, hoist=HOIST), arguments=('-r', '__ns:=/a'))
-    two = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/b'))
-    for each in (one, two):
-        each.online()
+    one = bridge(parameters(lift=LIFT, hoist=HOIST), arguments=('-r', '__ns:=/a')).online()
+    two = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/b')).online()
     assert run('enable', '/a/lift', '/a/hoist', '/b/lift')[0] == 0
     assert states(one, 'lift', 'hoist') == states(two, 'lift') * 2 == ['online'] * 2
     code, lines, errors = run('stop')
@@ -68,10 +66,8 @@ def test_stop_stops_every_drive_of_every_bridge(bridge: StartBridge, run: Run) -
 
 def test_names_patterns_and_namespaces(
         bridge: StartBridge, run: Run, locally: Lines) -> None:
-    one = bridge(parameters(lift=LIFT, hoist=HOIST), arguments=('-r', '__ns:=/a'))
-    two = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/b'))
-    for each in (one, two):
-        each.online()
+    one = bridge(parameters(lift=LIFT, hoist=HOIST), arguments=('-r', '__ns:=/a')).online()
+    two = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/b')).online()
 
     def run_all() -> None:
         assert run('enable', '/a/lift', '/a/hoist', '/b/lift')[0] == 0
@@ -166,10 +162,8 @@ def test_which_hung_bridge_may_have_a_drive_that_is_meant(
 
 
 def test_patterns_of_namespaces(bridge: StartBridge, client: Client, run: Run) -> None:
-    one = bridge(parameters(lift=LIFT, hoist=HOIST), arguments=('-r', '__ns:=/a1'))
-    two = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/a2'))
-    for each in (one, two):
-        each.online()
+    one = bridge(parameters(lift=LIFT, hoist=HOIST), arguments=('-r', '__ns:=/a1')).online()
+    two = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/a2')).online()
     assert run('enable', '/a1/lift', '/a1/hoist', '/a2/lift')[0] == 0
     assert run('disable', '/a*/lift')[0] == 0
     assert (states(one, 'lift', 'hoist'), states(two, 'lift')) == (

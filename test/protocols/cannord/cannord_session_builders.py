@@ -55,10 +55,8 @@ TICK = 1e-6
 
 def inverter(**options: Any) -> DriveConfiguration:
     """Configure a drive with one setpoint and one actual value, unless told otherwise."""
-    options.setdefault('request', (FREQUENCY,))
-    options.setdefault('response', (ACTUAL,))
-    options.setdefault('table', (*SETPOINTS, *VALUES, *PARAMETERS))
-    return drive('cannord', **options)
+    return drive('cannord', **{'request': (FREQUENCY,), 'response': (ACTUAL,), 'table': (
+        *SETPOINTS, *VALUES, *PARAMETERS), **options})
 
 
 def started(**options: Any) -> Conversation:

@@ -77,12 +77,9 @@ STILL_1 = '505#C60200AA00000000'
 
 def configuration(**options: Any) -> DriveConfiguration:
     """Make node 5 with two status registers in the round."""
-    options.setdefault('station', 5)
-    options.setdefault('table', TABLE)
-    options.setdefault('request', ())
-    options.setdefault('response', (STATUS, STATUS_2))
-    options.setdefault('parameter_timeout', 0.5)
-    return drive('canopen_pkw', **options)
+    return drive('canopen_pkw', **{
+        'station': 5, 'table': TABLE, 'request': (), 'response': (STATUS, STATUS_2),
+        'parameter_timeout': 0.5, **options})
 
 
 def started(**options: Any) -> Conversation:

@@ -50,13 +50,9 @@ OBJECTS = {(0x6064, 0): (1000).to_bytes(4, 'little'), (0x60FF, 0): bytes(4),
 
 def servo(mode: str = 'csv', **options: Any) -> DriveConfiguration:
     """Configure a drive with the setpoint of its mode, and its position."""
-    options.setdefault('request', (MODE_TARGETS[mode],))
-    options.setdefault('response', (POSITION,))
-    options.setdefault('table', TABLE)
-    options.setdefault('station', 5)
-    options.setdefault('period', PERIOD)
-    options.setdefault('name', 'axis')
-    return drive('cia402', mode=mode, **options)
+    return drive('cia402', mode=mode, **{
+        'request': (MODE_TARGETS[mode],), 'response': (POSITION,), 'table': TABLE,
+        'station': 5, 'period': PERIOD, 'name': 'axis', **options})
 
 
 class Axis(Pair):
