@@ -125,7 +125,8 @@ def _checked(drive: Drive, name: str, text: str) -> tuple[Value, str]:
     value = _value(parameter, text)
     if value is None:
         return 0, drive.write_refusal(name, parameter) or (
-            f'wrong type: {text!r}, expected {_expected(parameter)}')
+            f'wrong type: {text!r}, expected {_expected(parameter)}'
+            + _meant(parameter, text))
     return value, drive.check(name, value)
 
 
@@ -181,6 +182,16 @@ def _expected(parameter: Parameter) -> str:
     names = ', '.join(name for _, name in parameter.values[:_NAMES_SHOWN])
     more = ' …' if len(parameter.values) > _NAMES_SHOWN else ''
     return parameter.kind.words + (f' or one of {names}{more}' if names else '')
+
+
+def _meant(parameter: Parameter, text: str) -> str:
+    """Return what to write instead of a number with its unit, or with a comma; '': unknown."""
+    number = text.removesuffix(parameter.unit).strip()
+    if re.fullmatch(r'[-+]?[0-9]+,[0-9]+', number):
+        number = number.replace(',', '.')
+    meant = '' if number == text or _value(parameter, number) is None else f': write {number}'
+    in_unit = parameter.unit and text[:1] in '+-.0123456789'
+    return meant + (f' (in {parameter.unit})' if in_unit else '')
 
 
 def _show(args: Namespace, drives: Drives, wanted: dict[str, str],

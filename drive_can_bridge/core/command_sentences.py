@@ -31,7 +31,7 @@ full_names_only = Text('{word}: takes full names, no patterns', do='write the na
 seconds_at_most = Text('{text}: allowed are up to {most:g} s')
 jog_words = Text('write DRIVE VALUE, or DRIVE NAME VALUE')
 full_name_only = Text('{drive}: takes a full name, no patterns', do='write the name of the drive')
-no_number_or_bool = Text('{value} is no value: write a number, or true or false')
+no_number_or_bool = Text('{value} is no value: write a number without its unit, or true or false')
 trace_or_live = Text('give a trace file, or --live')
 filter_names_no_drive = Text('--drive {drive}: no such drive; drives: {drives}')
 would_write_over = Text('{file}: is read, and would be written over, choose another name')

@@ -23,7 +23,7 @@ def below(capsys: pytest.CaptureFixture[str], written: Any, *, ok: bool = True,
           namespace: str | None = None) -> list[str]:
     """Return what is printed behind the row of one value."""
     drive: Any = SimpleNamespace(name='axis', facts=SimpleNamespace(protocol=protocol),
-                                 rounded=lambda _, value: value)
+                                 rounded=lambda _, value: value, unnamed=lambda *_: None)
     args: Any = SimpleNamespace(json=json, params_file=params_file, namespace=namespace)
     _show(args, [drive], {written.name: '1'},  # type: ignore[arg-type]
           [(drive, WriteOutcome(written.name, ok, written, '' if ok else 'no answer'))])
