@@ -222,6 +222,24 @@ ROWS: tuple[Row, ...] = (
         'needs libcpc.so; channels are those of /etc/cpcconf.ini',
         "the kernel's drivers ems_usb, ems_pci: `socketcan`",
         'by the source of python-can-wuensche 1.0.0', module='python-can-wuensche'),
+    Row('remote', "python-can's interfaces of another computer (plug-in python-can-remote)",
+        'remote', 'ws://10.0.0.5:54701/',
+        'stamps of the other computer; where that hangs, the end of the bridge waits 5 s for it',
+        '`socketcand`, where the other computer has SocketCAN',
+        'its server 0.3.0, with a simulated servo', module='python-can-remote'),
+    Row('cannelloni', 'cannelloni over TCP (plug-in can-cannelloni)', 'cannelloni',
+        '10.0.0.5:20000', 'connects again by itself: a loss is seen when something is sent',
+        '`reconnect: false`', 'can-cannelloni 0.1.0, with a simulated servo',
+        module='can-cannelloni'),
+    Row('waveshare', 'Waveshare 2-CH-CAN-TO-ETH (plug-in can-waveshare)', 'waveshare',
+        '10.0.0.5:20001', 'nothing is heard of errors on the bus', 'none is needed',
+        'can-waveshare 0.1.0, with a simulated servo', module='can-waveshare'),
+    Row('damiao', 'Damiao USB-CAN (plug-in python-can-damiao)', 'damiao', '/dev/ttyACM0',
+        'data of fewer than 8 bytes leave at the wrong end; of frames that come together it '
+        'receives one', 'another adapter', 'python-can-damiao 0.1.0, over bytes',
+        module='python-can-damiao', drops=tuple(
+            Dropped('frames of fewer than 8 bytes as they are', Route(0, 0, extended))
+            for extended in (False, True))),
 )
 
 #: interfaces of python-can without a row -> why they cannot be used on Linux

@@ -37,7 +37,15 @@ def test_every_interface_has_a_row_or_a_reason() -> None:
     assert set(can.interfaces.BACKENDS) <= known
     assert not {row.interface for row in ROWS} & set(NOT_ON_LINUX)
     # plug-ins, which are no part of python-can
-    assert known - set(can.interfaces.BACKENDS) <= {'sontheim', 'wuensche'}
+    assert known - set(can.interfaces.BACKENDS) <= {
+        'sontheim', 'wuensche', 'remote', 'cannelloni', 'waveshare', 'damiao'}
+
+
+def test_one_that_garbles_short_frames_drives_nothing() -> None:
+    """The plug-in python-can-damiao 0.1.0; findings/ has the bytes."""
+    traits = traits_of(bus('damiao', '/dev/ttyACM0'))
+    assert traits is not None
+    assert {each.route.extended for each in traits.drops} == {False, True}
 
 
 def test_names_are_names() -> None:
