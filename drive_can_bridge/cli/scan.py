@@ -278,7 +278,8 @@ def define(parser: ArgumentParser) -> None:
     parser.epilog = (
         'Exit code 0: something was found. 1: nothing, or the bus cannot be used. 2: wrong '
         'usage, or a question that could not be asked.')
-    parser.add_argument('--interface', required=True, help='python-can interface: socketcan, …')
+    parser.add_argument('--interface', required=True, help='python-can interface: socketcan, …; '
+                        'drive_can adapters shows those of this machine, with their channels')
     parser.add_argument('--channel', required=True, help='what it calls its channel: can0, …')
     parser.add_argument('--bitrate', type=bitrate, metavar='B',
                         help='bit/s, also as 500k (default: what the interface is set to, and '
