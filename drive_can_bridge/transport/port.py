@@ -346,6 +346,8 @@ class Port(EndPoint):
                 step()
             except Exception:  # noqa: BLE001  a dead adapter may fail in any way; no remedy
                 pass
+        # plugins for python-can forget it, which then warns when the bus is collected
+        self._bus._is_shutdown = True
 
     def _malformed(self) -> None:
         self.rejected_frames += 1

@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Iterator
 import errno
 import fcntl
+import gc
 import itertools
 import os
 from pathlib import Path
@@ -119,6 +120,19 @@ def test_adapter_that_replaces_recv_itself() -> None:
     assert port.receive(0.02) == Frame(0x123, b'', False)
     assert port.receive(0.02) is None
     assert bus.waited == [0.02] * 3
+
+
+def test_a_closed_bus_is_not_said_to_be_open(caplog: pytest.LogCaptureFixture) -> None:
+    """The shutdown() of can-cannelloni 0.1.0 does not call that of python-can."""
+    class Plugin(FakeBus):
+        def shutdown(self) -> None:
+            pass
+
+    port = Port(Plugin(), REAL)
+    port.close()
+    del port
+    gc.collect()
+    assert caplog.messages == []
 
 
 @pytest.mark.parametrize('step', [-3600.0, 3600.0], ids=['back', 'forward'])
