@@ -143,6 +143,7 @@ class World:
         self.bus = self.active = True
         self.delay = PROMPT
         self.coming = Coming()
+        self.last_arrival = -math.inf
         self.looked_at = -math.inf
         self.unheard = Unheard()
         self.enabling = False   # a call that nobody has answered yet
@@ -202,6 +203,7 @@ class World:
         def arrives() -> None:
             if self.bus:
                 self.sessions[index].receive_frame(answer, self.now)
+        self.last_arrival = max(self.last_arrival, at)
         self.coming.plan(at, arrives)
 
     def told(self, partner: Partner, event: Any) -> None:
@@ -419,7 +421,7 @@ class World:
         for partner in self.partners:
             partner.motor.restarts()
             if self.unseen:     # what was answered before arrives later
-                partner.unseen_until = self.now + self.unseen + self.delay
+                partner.unseen_until = self.unseen + max(self.now + self.delay, self.last_arrival)
         if self.unseen == 0.0 or self.control:
             self.ends_unless_unseen()
         for partner in self.partners:
