@@ -31,6 +31,9 @@ STOLEN_MAX, ATTEMPTS = 0.05, 3
 #: takes long, and is run when it is named only
 NAMED_ONLY = ('builds', 'builds flood', 'builds stop', 'most', 'sweep')
 
+#: what others run as well, and nobody need see twice that it runs
+RUN_BY_OTHERS = ('builds stop', 'flood')
+
 
 @dataclass(frozen=True)
 class Pace:
@@ -207,8 +210,8 @@ def main(arguments: list[str] | None = None) -> int:
     os.environ.setdefault('ROS_LOG_DIR', logs.name)     # nobody wants them later
     results: dict[str, list[Any]] = {}
     stolen: dict[str, list[float]] = {}
-    names = options.scenarios or [
-        each for each in planned if options.smoke or each not in NAMED_ONLY]
+    left_out = RUN_BY_OTHERS if options.smoke else NAMED_ONLY
+    names = options.scenarios or [each for each in planned if each not in left_out]
     failed: list[str] = []
     print(f'before: {begun}\n\n{report.HEAD}', flush=True)
     try:
