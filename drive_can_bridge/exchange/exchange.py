@@ -56,8 +56,9 @@ PATIENCE, LITTLE_PATIENCE = LOST_TIME, 0.05
 LOOK_PERIOD = 0.05
 #: s by which the reader may be back too late before the timer thread does its work
 GRACE = 0.02
-#: s by which the reader is so late for a pass that it looks first at what has come meanwhile
-LATE = 0.0005
+#: s by which the reader is so late for a pass that it looks first at what has come meanwhile;
+#: sooner, that would only make passes later
+LATE = 0.003
 #: frames that may have come in one packet and are read before something is sent
 LOOK_AHEAD = 8
 #: s until the values sent last are published again
