@@ -89,7 +89,9 @@ def test_what_arrives_is_no_answer_to_a_question_that_never_left(kind: str) -> N
 @pytest.mark.parametrize('end', ['end', 'bus down'])
 def test_a_drive_that_answers_cycles_and_does_not_obey_its_word_is_named(
         kind: str, before: str, end: str) -> None:
-    assert not broken(kind, (('requests lost', 0.0), (before, 0.9), (end, 0.013)))
+    for later in [(), (('silent', 0.9),), (('mute', 0.9),), (('cycles lost', 0.9),),
+                  (('refuses', 0.9),)]:     # also if it is lost meanwhile
+        assert not broken(kind, (('requests lost', 0.0), (before, 0.9), *later, (end, 0.013)))
 
 
 def _nothing(*_: Any, **__: Any) -> None:

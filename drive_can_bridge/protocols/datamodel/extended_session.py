@@ -115,9 +115,9 @@ class ExtendedSession(Session):
         pending = self.duty.happened(Happened.ENDS) is Do.STOP
         return self._exchange.cycling or (self.stage is not Stage.IDLE and pending)
 
-    def bus_down(self, now: float, reason: str) -> None:
+    def lose(self, reason: Sentence, now: float) -> None:
         self._judge_word()
-        super().bus_down(now, reason)
+        super().lose(reason, now)
 
     def _judge_word(self) -> None:
         """Record a drive that answers cycles, as if it had heard its word, but runs on."""
@@ -353,6 +353,7 @@ class ExtendedSession(Session):
         if self._verify and not self.online:
             self.restart(now)
             return
+        self._judge_word()
         do = self.duty.happened(Happened.LOST if self.online else Happened.UNANSWERED)
         self.lose(reason, now)
         if do is not Do.NOTHING:    # setpoints that heard cycles go neutral with the next
