@@ -3,6 +3,7 @@
 
 import re
 
+from drive_can_bridge.core.host_sentences import STANDS_STILL
 from drive_can_bridge.core.messages import Text
 
 #: what each key of diagnostics means
@@ -58,8 +59,7 @@ def _coded(code: str, *texts: str, do: str) -> Text:
 VERDICTS = {
     row.code: row for row in (
         _coded('not_stopped', '{drive}: NOT STOPPED: {why}', 'NOT STOPPED: {why}',
-               do='make sure that the drive stands still, by other means if need be; then see '
-                  'what the reason says'),
+               do=f'{STANDS_STILL}; then see what the reason says'),
         _coded('no_fault_now', '{drive}: reports no fault: {why}', do='enable the drive to go on'),
         _coded('drive_went_offline', '{drive}: offline: {why}', 'offline: {why}',
                do='see what the reason says; then power, cable, station and bit rate of the '

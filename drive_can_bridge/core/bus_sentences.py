@@ -102,7 +102,9 @@ controller_bus_off = Text(
     'bus-off; {advice}; "ip link set {channel} down" and "up" start the controller again, "type '
     'can restart-ms 100" lets it do so by itself',
     do='check cable, shield, termination and bit rate, then run these commands')
-not_read_yet = Text('not read yet', do='wait a moment')
+not_read_yet = Text(
+    'being opened, nothing read from it yet',
+    do='wait a moment; where that stays, see what drive_can adapters says of the adapter')
 
 # -- buses and adapters: what to check, and what happens to frames --------------------------------
 nobody_acknowledges = Text(

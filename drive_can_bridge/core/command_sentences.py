@@ -92,7 +92,8 @@ link_in_use = Text(
     'directory',
     do='end the other simulation, or give another directory')
 no_object_written = Text("'{part}' is no object; write 6007h or 1800h.05h")
-no_drive_without = Text('{index:04X}h: without it there is no drive', do='leave that object there')
+no_drive_without = Text(
+    '{index:04X}h: no servo can be simulated without it', do='take it out of --without')
 option_of_other_family = Text(
     '{option} {name}: it is a drive of {protocol}, allowed are those of {allowed}')
 no_simulated_drive = Text("no drive '{word}'; drives: {drives}; also: status, list, help")
@@ -457,7 +458,8 @@ no_word_to_disable = Text(
 profile_too_large = Text(
     'the profile of its {entries} entries would be larger than {most} MiB, which no bridge reads',
     do='name fewer columns or objects; leave out what is not needed')
-no_directory = Text('{directory} is no directory')
+no_directory = Text(
+    '{directory} is no directory', do='make the directory, or write the path of one')
 no_file = Text('{name}: no such file')
 cell_unknown = Text(
     "{what} '{text}' is none of those that are known here",

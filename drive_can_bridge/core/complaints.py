@@ -20,6 +20,9 @@ _NAMES_MAX, _NAMES_NEAREST = 8, 4
 #: what a name is that means the control word
 THE_CONTROL_WORD = 'the control word, which the bridge sends by itself'
 
+_NEUTRAL_FROM = ('write both below the parameter in the profile, for example neutral_from: '
+                 'actual_position and arming_tolerance: 0.01 (in its unit)')
+
 # -- what may be meant instead
 did_you_mean = Text("did you mean '{word}'?", do='write that word')
 near = Text(" (did you mean '{word}'?)",
@@ -424,8 +427,7 @@ quantity_already = Text('{name!r} is the {quantity} already, allowed is another 
 no_neutral_from = Text(
     '{name!r} has no neutral_from: without a command the axis goes to {neutral!r} {unit}, '
     'wherever it stands',
-    do='write neutral_from: the actual position, and arming_tolerance, below the parameter in '
-       'the profile')
+    do=_NEUTRAL_FROM)
 no_effect = Text('has no effect: no parameter of the joint has the unit {unit}')
 continuous_without_position = Text('goes on with a position, allowed with position only')
 continuous_commanded = Text(
@@ -682,8 +684,7 @@ no_index = Text("'{name}' has no index, allowed in a PDO are objects")
 no_neutral_position = Text(
     'missing: a position has no value that is neutral everywhere; allowed in {name} is the '
     'name of the actual position, with an arming_tolerance',
-    do='write neutral_from: the actual position, and arming_tolerance, below the parameter in '
-       'the profile')
+    do=_NEUTRAL_FROM)
 node_of_drive = Text(
     '{node} is the station of drive {drive}, allowed is a node-ID that no drive has',
     do='write another bridge_node')
@@ -707,7 +708,9 @@ no_subindex = Text('{family} knows no sub-index, allowed is number alone', do='d
 mapping_parameter = Text(
     "'{name}' ({address}) is a mapping parameter, allowed are others than {base} to {last}",
     do='delete it from the list: the bridge reads and writes the maps itself')
-moved_out = Text("{offset} moves '{name}' ({address}) out of the allowed 0 to {most}")
+moved_out = Text(
+    "{offset} moves '{name}' ({address}) out of the allowed 0 to {most}",
+    do='write a parameter_offset that keeps every number of the profile in that range')
 access_impossible = Text(
     '{access} is impossible, {name} is never written; allowed is ro',
     do='write access: ro')

@@ -8,19 +8,22 @@ Their texts stand in :mod:`drive_can_bridge.host_texts`; the rows add what to do
 from drive_can_bridge import host_texts
 from drive_can_bridge.core.messages import catalogue, Text
 
-_STANDS_STILL = 'make sure that the drive stands still, by other means if need be'
+#: the advice behind all that may still be running
+STANDS_STILL = (
+    'make sure that the drive stands still; if not, stop it at its own panel or by its power')
+#: the advice where bridges cannot be told apart
+APART = 'end one, and start it again with --ros-args -r __ns:=/cell2 (launch: namespace:=cell2)'
 _HANGS = 'see whether that process hangs; end it, and start the bridge again'
 _SAME_VERSION = 'use a command of the same version as the bridge; the way through ROS is taken'
 
 # -- drive_can stop, enable, disable, reset: what became of it ------------------------------------
-may_run = Text(host_texts.may_run, do=_STANDS_STILL)
-drives_may_run = Text(host_texts.drives_may_run, do=_STANDS_STILL)
+may_run = Text(host_texts.may_run, do=STANDS_STILL)
+drives_may_run = Text(host_texts.drives_may_run, do=STANDS_STILL)
 bridge_does_not_answer = Text(
-    host_texts.bridge_does_not_answer, do=f'{_STANDS_STILL}; see whether the bridge hangs')
+    host_texts.bridge_does_not_answer, do=f'{STANDS_STILL}; see whether the bridge hangs')
 bridges_hide_each_other = Text(
-    host_texts.bridges_hide_each_other,
-    do=f'{_STANDS_STILL}; start each bridge in a namespace of its own')
-not_online_may_run = Text(host_texts.not_online_may_run, do=_STANDS_STILL)
+    host_texts.bridges_hide_each_other, do=f'{STANDS_STILL}; {APART}')
+not_online_may_run = Text(host_texts.not_online_may_run, do=STANDS_STILL)
 not_here = Text(host_texts.not_here, do=_HANGS)
 order_unanswered = Text(
     host_texts.order_unanswered,

@@ -9,6 +9,7 @@ docs/messages.md is made of them.
 from collections.abc import Mapping
 from enum import Enum
 
+from drive_can_bridge.core.host_sentences import APART, STANDS_STILL
 from drive_can_bridge.core.messages import catalogue, Text
 
 
@@ -29,6 +30,11 @@ def _by_name(raws: Mapping[str, int | None]) -> str:
                      for name, raw in raws.items())
 
 
+_ACTIVATE = 'activate the bridge: ros2 lifecycle set BRIDGE activate'
+_MAPS_DIFFER = ('end the bridge, see what drive_can probe DRIVE --params-file FILE says of the '
+                'maps, and correct the file or the drive; mapping: configure helps only where '
+                'diagnostics offer it')
+
 #: the same in other words
 uncoded = Text('{text}', do='what the text says')
 
@@ -47,10 +53,10 @@ drive_offline_because = Text(
     'drive offline: {reason}',
     do='start the node (nmt_start), or wait until it is started by others')
 bus_down = Text('bus down', do='see what diagnostics say of the bus; it is opened again by itself')
-bridge_inactive = Text('bridge inactive', do='activate the bridge')
+bridge_inactive = Text('bridge inactive', do=_ACTIVATE)
 bridge_has_gone = Text(
     'no answer: its bridge has gone',
-    do='see why the bridge has ended; make sure that the drive stands still')
+    do=f'{STANDS_STILL}; see why the bridge has ended')
 not_sent = Text(
     'not sent: the bus takes no frames',
     do='look at cable, termination and bit rate; ask again')
@@ -161,8 +167,7 @@ no_control_section = Text(
 nothing_commanded = Text('nothing is commanded', do='nothing')
 neutral_without_control = Text('neutral; it has no control word', do='nothing')
 neutral_unanswered = Text(
-    'told to be neutral, but no answer to that in {timeout:g} s',
-    do='make sure that the drive stands still, by other means if need be')
+    'told to be neutral, but no answer to that in {timeout:g} s', do=STANDS_STILL)
 disabled_instead = Text(
     '{outcome}; told to disable, the profile has no quick_stop word',
     do='nothing')
@@ -184,9 +189,7 @@ stop_under_way = Text(
     '{stop} under way: try {action} again when it has ended',
     do='call again when the stop has been answered')
 members_offline = Text('{names:, } offline', do='see what diagnostics say of these drives')
-members_may_run = Text(
-    '{names:, } offline: it may still be running',
-    do='make sure that the drive stands still, by other means if need be')
+members_may_run = Text('{names:, } offline: it may still be running', do=STANDS_STILL)
 group_is_led = Text(
     '{leader} leads the broadcast group: call ~/{service} of {leader}',
     do='call it there')
@@ -220,13 +223,15 @@ fault_present = Text(
 stuck = Text(
     'no confirmation in {timeout:g} s: stuck in state {state} ({status}); {remarks:; }',
     'no confirmation in {timeout:g} s: stuck in state {state} ({status})',
-    do='see what keeps the drive in that state; raise control_timeout for long ramps')
+    do='see whether the drive stands; its manual says what leads out of that state; where a ramp '
+       'takes longer, raise control_timeout')
 voltage_disabled = Text(
     'voltage is disabled: power is missing, or safe torque off or an enable input keeps it off',
     do='look at the supply of the motor, at safe torque off (STO), and at the digital inputs')
 quick_stop_active = Text(
-    'a quick stop is active: look at the digital inputs with that function',
-    do='look at the digital inputs with that function')
+    'a quick stop is active that this control word does not ask for: look at its digital inputs '
+    'and at other sources of commands',
+    do='look which digital input, or other source of commands, is set to quick stop')
 bus_not_in_control = Text(
     'the bus is not in control: look at P509 and P510',
     do='look at P509 and P510')
@@ -301,7 +306,7 @@ homing_failed = Text(
     do='look at method, speeds and switches (6098h, 6099h)')
 homing_moves_on = Text(
     'the axis does not stand',
-    do='stop it by other means; set a control_timeout longer than its ramp')
+    do=f'{STANDS_STILL}; set a control_timeout longer than its ramp')
 mode_refused = Text(
     'the drive does not change to mode {mode}',
     do='see whether the drive has that mode (6502h)')
@@ -336,8 +341,8 @@ disregards = Text(
     'does not obey {action} ({word:04X}h): stop it by other means; still {state} ({status}); '
     'where its ramp is longer than control_timeout, set that longer',
     fields='state status action word',
-    do='stop it by other means; then see whether the drive takes its control word from the bus '
-       '(local control, inputs)')
+    do=f'{STANDS_STILL}; then see whether it takes its control word from the bus (local control, '
+       'inputs)')
 
 # -- defects of this program ----------------------------------------------------------------------
 internal_error = Text(
@@ -346,33 +351,26 @@ internal_error = Text(
 partner_failed = Text('{name}: {why}', do='report it')
 
 # -- stops ----------------------------------------------------------------------------------------
-may_still_be_running = Text(
-    '{why}: it may still be running',
-    do='make sure that the drive stands still, by other means if need be')
+may_still_be_running = Text('{why}: it may still be running', do=STANDS_STILL)
 stop_not_passed_on = Text(
     'a stop cannot be passed on to this bridge ({why}): its drives may still be running',
-    do='stop it from its own host; make sure that its drives stand still')
-no_answer_to_stop = Text('no answer in {seconds:g} s', do='see whether the drive stands still')
+    do=f'stop it from its own host; {STANDS_STILL}')
+no_answer_to_stop = Text('no answer in {seconds:g} s', do=STANDS_STILL)
 nobody_takes = Text(
-    'nobody offers its ~/{service}',
-    do='see whether the drive stands still, and whether its bridge runs')
-stop_not_answered = Text(
-    'told to stop, but it does not answer',
-    do='see whether the drive stands still')
-stop_failed = Text('told to stop, but {what:; }', do='see whether the drive stands still')
+    'nobody offers its ~/{service}', do=f'{STANDS_STILL}; see whether its bridge runs')
+stop_not_answered = Text('told to stop, but it does not answer', do=STANDS_STILL)
+stop_failed = Text(
+    'told to stop, but {what:; }',
+    do=f'{STANDS_STILL}; then look at what stands behind "but"')
 still_in_state = Text(
     'it is still in state {state}',
     do='stop the drive at its own panel, or by its power')
-stop_not_possible = Text('could not be told to stop', do='see whether the drive stands still')
-bus_lost_before_stop = Text(
-    'the bus was lost before it could be told to stop',
-    do='see whether the drive stands still')
+stop_not_possible = Text('could not be told to stop', do=STANDS_STILL)
+bus_lost_before_stop = Text('the bus was lost before it could be told to stop', do=STANDS_STILL)
 ends_before_stop = Text(
-    'the bridge ends before the drive has confirmed its stop',
-    do='see whether the drive stands still')
+    'the bridge ends before the drive has confirmed its stop', do=STANDS_STILL)
 position_unknown = Text(
-    'where its axis is, nobody knows, so that it is told nothing',
-    do='see whether the axis stands still')
+    'where its axis is, nobody knows, so that it is told nothing', do=STANDS_STILL)
 stopped_again = Text('told to stop once more, which it has confirmed', do='nothing')
 no_answer_for_map = Text(
     'no answer for map parameter {number}',
@@ -392,8 +390,8 @@ write_read_back = Text(
 write_refused = Text('{what} {reason}', do='look the code up in the manual of the drive')
 
 # -- why a drive is offline, and what to look at --------------------------------------------------
-not_activated = Text('not activated', do='activate the bridge')
-deactivated = Text('deactivated', do='activate the bridge')
+not_activated = Text('not activated', do=_ACTIVATE)
+deactivated = Text('deactivated', do=_ACTIVATE)
 looked_for = Text(
     'being looked for',
     do='wait a moment; where that stays, check power, cable, station and bit rate')
@@ -489,9 +487,7 @@ restarted_waiting = Text(
     do='wait; where it restarts again and again, see its power supply')
 
 # -- maps -----------------------------------------------------------------------------------------
-mapping_differs = Text(
-    'mapping differs: {how}',
-    do='correct the drive or the configuration, or set mapping configure')
+mapping_differs = Text('mapping differs: {how}', do=_MAPS_DIFFER)
 of_object = Text(
     '{what}: {why}',
     do='take it out of cyclic_request or cyclic_response, or correct it in the profile')
@@ -531,9 +527,7 @@ mode_not_offered = Text(
 interpolation_time_left = Text(
     'a period of {period:g} s cannot be written to 60C2h exactly: it is left as it is',
     do='choose a period in whole milliseconds')
-maps_found = Text(
-    '{differences}',
-    do='correct the drive or the configuration, or set mapping configure')
+maps_found = Text('{differences}', do=_MAPS_DIFFER)
 maps_wait = Text(
     '{found}; rewritten before, not again within {pause:g} s',
     do='see who else writes the maps of this drive')
@@ -657,7 +651,7 @@ word_held_back = Text(
     do='see why the drive does not take the setpoint')
 neutral_not_taken = Text(
     'neutral is not taken, write of {what}',
-    do='see why the drive does not take the setpoint')
+    do=f'{STANDS_STILL}; look the reason up in its manual, then enable it again')
 timeout_too_tight = Text(
     'telegram time-out {timeout:g} s ({name}, {address}) is too tight for a period of '
     '{period:g} s: set it to {least:g} s or more, or shorten the period',
@@ -799,11 +793,9 @@ bus_load_high = Text(
 
 # -- diagnostics: how a drive is, and what to do --------------------------------------------------
 online = Text('online', do='nothing')
-activate_bridge = Text('bridge inactive: activate it', do='activate it')
+activate_bridge = Text('bridge inactive: activate it', do=_ACTIVATE)
 bridge_ended = Text('bridge ended: start it again', do='start it again')
-bridge_ended_may_run = Text(
-    'bridge ended: it may still be running',
-    do='make sure that the drive stands still, by other means if need be')
+bridge_ended_may_run = Text('bridge ended: it may still be running', do=STANDS_STILL)
 stopped_for_defect = Text(
     'offline: {why}; told to stop, looked for again in a moment; please report this defect of '
     'the bridge with its log',
@@ -812,7 +804,9 @@ bus_of_drive_down = Text('bus {bus} is down', do='see what diagnostics say of th
 bus_hangs = Text(
     'bus {bus} hangs, its drives are not told anything: its adapter does not return from a send',
     do='unplug the adapter, or end the bridge')
-bus_of_drive_opening = Text('bus {bus} is not open yet', do='wait')
+bus_of_drive_opening = Text(
+    'bus {bus} is not open yet',
+    do='wait a moment; where that stays, see what drive_can adapters says of the adapter')
 never_seen = Text(
     'not seen since start: {why}; check its power, cable, station number and bit rate',
     do='check its power, cable, station number and bit rate')
@@ -830,8 +824,7 @@ silent_since = Text(
     'silent since {since}, was online before: check its power and cable ({why})',
     do='check its power and cable')
 maps_to_correct = Text(
-    '{why}; correct the drive or the configuration, or set mapping: configure',
-    do='correct the drive or the configuration, or set mapping configure')
+    '{why}; correct the drive or the configuration, or set mapping: configure', do=_MAPS_DIFFER)
 drive_to_correct = Text(
     '{why}; correct the drive or the configuration',
     do='correct the drive or the configuration')
@@ -852,7 +845,7 @@ fault = Text(
     do='remove its cause, reset it, enable the drive')
 still_running = Text(
     'told to stop, and still {state}',
-    do='wait for its ramp, or stop it by other means')
+    do=f'wait for its ramp; {STANDS_STILL}')
 disabled = Text('disabled: {enable}', do='enable it, if it is to move')
 disabled_and_commanded = Text(
     'disabled: {enable}; commands arrive, and change nothing',
@@ -943,14 +936,16 @@ jog_commanded = Text(
     'is commanded by others: {who:, }; two who command one drive move it by turns',
     do='end who else publishes commands to the drive')
 jog_not_told = Text(
-    'its bridge does not say what can be commanded: it is inactive, or older than jog',
-    do='activate the bridge, or start it again after an update')
+    'its bridge does not say what can be commanded: it is inactive, or a version without '
+    'drive_can jog',
+    do=f'{_ACTIVATE}; after an update, start it again')
 jog_not_armed = Text(
     'was not armed within {seconds:g} s of neutral commands', do='see diagnostics of the drive')
 jog_no_longer = Text('is no longer {state}', do='see diagnostics of the drive')
 jog_neutral_again = Text(
     'the bridge sends {sent} instead of {wanted}: the setpoint is not armed any more',
-    do='see the log of the bridge')
+    do='the drive has neutral; the log of the bridge says what disarmed it (late commands, a '
+       'stop, a fault): remove that, and jog again')
 jog_not_taken = Text(
     'the bridge did not send {wanted} within {seconds:g} s', do='see the log of the bridge')
 jog_late = Text(
@@ -959,8 +954,7 @@ jog_late = Text(
 jog_bridge_silent = Text(
     'nothing has come from its bridge for {seconds:g} s: if the bridge has ended, the drive may '
     'still be running',
-    do='make sure that the drive stands still, by other means if need be; see whether the bridge '
-       'still runs')
+    do=f'{STANDS_STILL}; see whether the bridge still runs')
 jog_unanswered = Text(
     'no exchange that carried {value} was answered', do='see diagnostics of the drive')
 jog_neutral_unseen = Text(
@@ -985,8 +979,7 @@ shut_down = Text(
     'shut down: nothing is sent any more; end this process, and start it again to go on',
     do='end the process, and start it again where drives are to run')
 stop_frames_not_sent = Text(
-    'bus {bus}: the stop frames could not all be sent: {reason}',
-    do='make sure that its drives stand still, by other means if need be')
+    'bus {bus}: the stop frames could not all be sent: {reason}', do=STANDS_STILL)
 commands_discarded = Text(
     '{count:#command} thrown away: {why}',
     do='see what held the bridge up; publish again')
@@ -1027,9 +1020,7 @@ failed_and_looked_for = Text(
 command_timed_out = Text(
     'no command for {timeout:g} s: {names:, } neutral until armed again',
     do='publish at least once in command_timeout; arm it again')
-no_cyclic_frame = Text(
-    'mapping differs, no cyclic frame is sent: {how}',
-    do='correct the drive or the configuration, or set mapping configure')
+no_cyclic_frame = Text('mapping differs, no cyclic frame is sent: {how}', do=_MAPS_DIFFER)
 maps_rewritten = Text('maps of the drive rewritten: {how}', do='nothing')
 frame_rejected = Text('frame rejected: {what}', do='see who else sends on its identifiers')
 stopped_state_differs = Text(
@@ -1153,10 +1144,10 @@ node_not_operational = Text(
 leave_file_away = Text('leave --params-file away to go through it', do='leave --params-file away')
 bridge_sends_word = Text(
     'control word: only a running bridge sends it',
-    do='use drive_can enable, disable, stop, or ~/enable')
+    do='start the bridge; then drive_can enable, disable, stop, or ~/enable')
 bridge_sends_setpoint = Text(
     'setpoint {name}: only a running bridge sends it',
-    do='use drive_can jog, or publish it')
+    do='start the bridge; then drive_can jog, or publish to ~/command/NAME')
 bus_closed = Text('bus {bus}: is closed already', do='open it again')
 bus_because = Text('bus {bus}: {reason}', do='look at the adapter; see what the reason says')
 telegrams_supervised = Text(
@@ -1181,29 +1172,26 @@ several_bridges = Text(
     'several bridges are running: {names:, }; choose one with --namespace',
     do='give --namespace NS: what stands before the last / of its name')
 bridges_of_one_name = Text(
-    '{count} bridges are called {name}: start each in a namespace of its own',
-    do='start each in a namespace of its own')
+    '{count} bridges are called {name}: start each in a namespace of its own', do=APART)
 drive_of_two_bridges = Text(
     '{one} and {other} have a drive {drive} each: start each in a namespace of its own',
-    do='start each in a namespace of its own')
+    do=APART)
 bridge_ended_here = Text('bridge ended', do='nothing: it was ended from here')
 bridge_silent_may_run = Text(
     'may still be running: its bridge is silent',
-    do='see whether the bridge runs; make sure that the drive stands still, by other means if '
-       'need be')
+    do=f'{STANDS_STILL}; see whether the bridge runs')
 no_sample = Text(
     'offline: no sample for {seconds:.0f} s: is its bridge {bridge} still running?',
     do='see whether that bridge runs')
 bridge_silent = Text('its bridge {bridge} is silent', do='see whether that bridge runs')
 drive_of_silent_bridge = Text(
     'its bridge is silent since {since}',
-    do='make sure that the drive stands still, by other means if need be; see whether its bridge '
-       'runs')
+    do=f'{STANDS_STILL}; see whether its bridge runs')
 stopped_answering = Text('offline: it stopped answering', do='wait for what diagnostics say of it')
 bridge_silent_since = Text(
     'bridge {name}silent since {since}: its drives may still be running; a stop may not reach '
     'them',
-    do='make sure that its drives stand still, by other means if need be')
+    do=STANDS_STILL)
 no_such_value = Text('{word} is no value: write {kind}{example}', do='write a value of that kind')
 moves_the_drive = Text(
     'moves the drive: not written here',
@@ -1213,7 +1201,7 @@ protected = Text(
     do='use drive_can write or restore --include-protected, knowing what it does')
 no_bridge_tells = Text(
     '{names:, }: in the graph, but no bridge tells of it: may be running',
-    do='see which process has that drive; make sure that the drive stands still')
+    do=f'{STANDS_STILL}; see which process has it')
 setpoint_of_bridge = Text('sent cyclically: a setpoint', do='publish it, or use drive_can jog')
 word_of_bridge = Text('control word: use ~/enable', do='use drive_can enable, disable, stop')
 map_of_bridge = Text(

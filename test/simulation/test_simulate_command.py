@@ -165,7 +165,7 @@ def refused(capsys: pytest.CaptureFixture[str], directory: Path, *arguments: str
     (('--without', 'lift=6007h'), 2,
      'lift: it is a drive of datamodel_extended, allowed are those of cia402'),
     (('--without', 'lift=6o07h'), 2, "'6o07h' is no object; write 6007h or 1800h.05h"),
-    (('--without', 'lift=605Ah,6041h'), 2, '6041h: without it there is no drive'),
+    (('--without', 'lift=605Ah,6041h'), 2, '6041h: no servo can be simulated without it'),
     (('--habit', 'belt:start=1'), 2, "no drive 'belt'"),
     (('--habit', 'lift:start=-1'), 2, "'start=-1' is not possible; allowed: "
                                       'mapping=checked|operational|unchecked, start=0…60, '),
