@@ -93,8 +93,8 @@ class ModeBits:
 
     :param mask: those bits.
     :param at_end: their state afterwards.
-    :param ended: those of them that show a drive left in the mode: set
-        before, and otherwise afterwards.
+    :param ended: those that a later step of ``restore`` changes back: a drive that does not have
+        them as in ``at_end`` was left in the mode.
     """
 
     mask: int
@@ -118,7 +118,7 @@ class ModeBits:
 
 
 def mode_bits(table: RestoreTable | None) -> dict[str, ModeBits]:
-    """Return the bits that belong to modes, by parameter."""
+    """Return the bits that the ``restore`` section of a profile changes, by parameter."""
     found: dict[str, ModeBits] = {}
     for step in (*table.before, *table.after) if table is not None else ():
         known = found.get(step.parameter, ModeBits(0, 0))

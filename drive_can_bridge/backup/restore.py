@@ -129,7 +129,7 @@ class RestorePlan:
     :param changes: in the order in which they are written.
     :param kept: settings that are not as in the file, and stay so.
     :param same: names of settings that are as in the file.
-    :param words: all that is to be as in the file afterwards, by name.
+    :param words: what the drive is to have afterwards, as raw words, by name.
     :param wanted: the same as values.
     :param found: what the drive has of all that was read.
     :param unread: settings that could not be read.

@@ -209,7 +209,8 @@ class Demo:
         """
         Wait for the end.
 
-        :return: exit code: 0 after a signal, the duration, or when the user has enough.
+        :return: exit code: 0 after a signal or ``--duration``, or when the view was quit; 1 when
+            a process ended by itself with an error.
         """
         begun, duration = self._clock.now(), self._args.duration
         while True:

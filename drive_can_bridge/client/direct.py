@@ -407,10 +407,11 @@ ADVICE = sentences.leave_file_away()
 
 class DirectSource:
     """
-    The drives of a parameter file.
+    The drives of a parameter file, reached on their buses, without a bridge.
 
     :param nmt_start: start CANopen nodes before they are asked.
     :raises ConfigurationError: the file is wrong.
+    :ivar listens: opening listens for another master first.
     """
 
     listens = True

@@ -412,7 +412,7 @@ class Session(ABC):
         """Record that the drive is lost."""
 
     def went_offline(self) -> None:  # noqa: B027  optional
-        """Forget the state of a drive that is online."""
+        """Forget what is known only of a drive that is online."""
 
     def withdrawn(self, now: float) -> None:
         """Record that the control word is ``disable`` again."""

@@ -106,7 +106,8 @@ class EdsSection:
     """
     A section with its values as written; keys are compared without case.
 
-    :param comments: Sevcon's, in front of those about single bits.
+    :param comments: keys and values in comment lines, as Sevcon writes them; those behind
+        ``split``, which are about single bits, are left out.
     """
 
     name: str

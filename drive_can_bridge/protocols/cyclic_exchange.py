@@ -118,7 +118,7 @@ class CyclicExchange(Generic[TelegramT]):
 
     @property
     def sending_more(self) -> bool:
-        """The last cycles are more than a drive gets that answers."""
+        """More cycles of a stop are under way: the first were not all acknowledged."""
         return self._ending in (Ending.MORE, Ending.WAITING_LONGER)
 
     @property

@@ -90,7 +90,7 @@ class CyclicWatch:
         return Verdict.NORMAL if self._last == -math.inf else Verdict.UNASKED, math.nan
 
     def expire(self, now: float) -> float:
-        """Give up a request that was not answered until ``now``; return when to look again."""
+        """Give up a request whose time is over; return when it will be (infinity: none)."""
         due = self._asked + self._patience
         if due <= now:
             self._miss(due)
@@ -134,7 +134,7 @@ class AnswerWatch:
         return latency
 
     def expire(self, now: float) -> float:
-        """Give up a request that was not answered until ``now``; return when to look again."""
+        """Give up a request whose time is over; return when it will be (infinity: none)."""
         due = self._asked + self._timeout
         if due <= now:
             self._asked = math.nan

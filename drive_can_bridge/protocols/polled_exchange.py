@@ -98,7 +98,11 @@ class Polled(Protocol):
         """A drive is there, should it answer."""
 
     def read_round(self) -> Generator[Any, Any, Raws | None]:
-        """Read everything; return None when a read was not answered."""
+        """
+        Read all of ``cyclic_response`` once.
+
+        :return: None in place of a value that is refused; None alone: a read was not answered.
+        """
 
     def round_found(self, now: float) -> None:
         """Handle a drive that was offline and has answered a round."""

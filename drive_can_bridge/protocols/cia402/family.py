@@ -134,7 +134,7 @@ class Cia402(Family):
         return self._own_load(drive) + self._shared_load([drive])
 
     def loads(self, drives: Sequence[DriveConfiguration]) -> list[float]:
-        """Return the load of each drive; SYNC and the bridge's heartbeat are there once."""
+        """Return bit/s of each drive; SYNC and the bridge's heartbeat in equal shares."""
         share = self._shared_load(drives) / len(drives) if drives else 0.0
         return [self._own_load(drive) + share for drive in drives]
 

@@ -82,7 +82,7 @@ class HeartbeatSender:
             self._heartbeat.rest()
 
     def was_missed(self, timing: TimingAdvice, now: float) -> None:
-        """Report what would have held: the drive has missed that of the bridge."""
+        """Report that the drive missed the bridge's heartbeat, and what would have held."""
         if self._heartbeat is None:     # whose else it watches, it does not say
             return
         interval = self._session.configuration.options.bridge_heartbeat

@@ -127,14 +127,14 @@ class Standstill:
         self.forget()
 
     def forget(self) -> None:
-        """Know nothing of the drive, not even which objects it has."""
+        """Forget what is known of the drive, also which objects it has."""
         self._position_object, self._velocity_object = states.POSITION, states.VELOCITY
         self._state = None
         self.begin(-math.inf)
         self.watching = False
 
     def begin(self, now: float) -> None:
-        """Watch it from now on."""
+        """Watch whether the axis stands, from now on; what was measured before does not count."""
         self.watching, self._since, self._now = True, now, now
         self.band.begin()
         self._threshold: int | None = None
