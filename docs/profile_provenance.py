@@ -2,7 +2,7 @@
 """
 How far each entry of the shipped profiles can be trusted, as a page of the documentation.
 
-The page is made from the profiles; a test compares it. To write it anew:
+The page is made from the profiles; a test compares it. To write it again:
 ``.venv/bin/python docs/profile_provenance.py``.
 """
 
@@ -24,9 +24,9 @@ _HEAD = """\
 # How far the shipped profiles can be trusted
 
 What of each entry is open, because no document backs it, and in brackets which documents back the
-rest (of each entry by itself they stand in the profile). *Verified*: documents back address, type,
-scale and unit. *Unverified*: look up in the drive's manual what is open before you rely on it. No
-profile has been compared with a device.
+rest (the profile says which back each entry by itself, and names them in full). *Verified*:
+documents back address, type, scale and unit. *Unverified*: look up in the drive's manual what is
+open before you rely on it. No profile has been compared with a device.
 
 Made by `docs/profile_provenance.py`; edit the profiles ([keys](profiles.md)).
 """
@@ -47,22 +47,15 @@ def _section(checked: Checked) -> Iterator[str]:
     yield f'## {profile.name}'
     yield ''
     yield f'{profile.description}. {len(profile.parameters)} entries, {checked.count(True)} of ' \
-          'them verified.'
-    yield ''
+          f'them verified. [Documents](../config/profiles/{profile.name}.yaml)'
     for verified, title in TITLES.items():
         if groups := _groups(checked, verified):
-            yield f'### {title}'
-            yield ''
+            yield from ('', f'### {title}', '')
             for still_open, (names, sources) in groups.items():
                 named = _RUN.sub(r'`\1_\2` to `\1_\3`', ', '.join(names))
                 backed_by = ', '.join(sources) or 'no document'
                 yield f'* {named}: {still_open} ({backed_by})' if still_open \
                     else f'* {named}: nothing'
-            yield ''
-    yield '### Sources'
-    yield ''
-    for key, text in checked.sources.items():
-        yield f'* **{key}**: {text}'
 
 
 def _groups(checked: Checked, verified: bool | None) -> dict[str, tuple[list[str], list[str]]]:

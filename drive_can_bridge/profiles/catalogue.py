@@ -59,11 +59,6 @@ class Checked:
         parameters = self.loaded.tree.data.get('parameters', {})
         return {name: parameters[name] for name in self.loaded.profile.parameters}
 
-    @property
-    def sources(self) -> dict[str, str]:
-        """The sources of the statements, by key."""
-        return dict(self.loaded.tree.data.get('sources', {}))
-
     def count(self, verified: bool | None) -> int:
         """Return how many entries are marked as verified, as not, or (None) as neither."""
         return sum(each.verified is verified for each in self.loaded.profile.parameters.values())
