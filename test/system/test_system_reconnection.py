@@ -77,8 +77,9 @@ def rearm_and_move(client: Client, drive: str, bridge: Process, simulator: Simul
 
 
 @pytest.mark.real
-def test_simulator_is_killed_and_restarted(processes: Processes, client: Client, namespace: str,
-                                           tmp_path: Path) -> None:
+def test_adapter_is_pulled_and_another_plugged_in(
+    processes: Processes, client: Client, namespace: str, tmp_path: Path,
+) -> None:
     file = bridge_file(tmp_path)
     simulator, bridge, drive = moving(processes, client, namespace, file)
     simulator.kill()
