@@ -180,7 +180,8 @@ class World:
         if lost:
             return
         self.hears(sent)
-        self.sync_lost = self.sync_lost and not (sync and not self.cycles_lost)
+        rpdo = 0x200 <= sent.identifier < 0x580    # one that is heard takes effect instead
+        self.sync_lost = self.sync_lost and not ((sync or rpdo) and not self.cycles_lost)
 
     def hears(self, sent: Frame) -> None:
         """Have the drives answer."""
@@ -234,7 +235,7 @@ class World:
             session.next_timer() for session in self.sessions), math.inf),
             timers=self.timers, then=self.judged)
         self.now = end
-        self.took()
+        self.judged()   # also where nothing has happened, as on a bus that is down
 
     def timers(self) -> None:
         self.publish()
