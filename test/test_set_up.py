@@ -8,7 +8,6 @@ package that somebody added is lost.
 """
 
 from contextlib import suppress
-from itertools import islice
 import os
 from pathlib import Path
 import re
@@ -256,8 +255,8 @@ def test_progress_never_stands_still(checkout: Checkout) -> None:
         try:
             for wanted in (r'setup: \d+ s, fetching: 3 files so far',
                            r'setup: \d+ s, installing: \d+ MB so far'):
-                lines = islice(setting_up.stderr, 200)
-                assert any(re.match(wanted, line) for line in lines)
+                # however long the environment takes before: a busy machine shows many lines
+                assert any(re.match(wanted, line) for line in setting_up.stderr)
                 gate.write_text('')
             assert setting_up.wait() == 0
         finally:

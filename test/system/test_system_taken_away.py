@@ -14,7 +14,7 @@ import sys
 from parameter_files import bridge_file
 from processes import Client, Process, Processes
 import pytest
-from test_system_parameters import LIFT
+from test_system_parameters import ALL
 
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.sentences import (
@@ -50,7 +50,7 @@ def without(processes: Processes, what: str, module: str, *arguments: str) -> Pr
 def test_bridge_and_commands_go_on_with_a_word(processes: Processes, client: Client,
                                                namespace: str, tmp_path: Path,
                                                what: str) -> None:
-    file = bridge_file(tmp_path, drives={'lift': LIFT})
+    file = bridge_file(tmp_path, drives={'lift': ALL['lift']})
     simulator = processes.simulator(file)
     bridge = without(processes, what, 'ros.start', '--ros-args', '--params-file', str(file),
                      '-r', f'__ns:=/{namespace}')
@@ -78,7 +78,7 @@ def test_bridge_and_commands_go_on_with_a_word(processes: Processes, client: Cli
 
 
 def test_a_bridge_names_what_it_cannot_do_without(processes: Processes, tmp_path: Path) -> None:
-    file = bridge_file(tmp_path, drives={'lift': LIFT})
+    file = bridge_file(tmp_path, drives={'lift': ALL['lift']})
     started = {name: without(processes, what, 'ros.start', '--ros-args', '--params-file',
                              str(file)) for what, name in NEEDED.items()}
     for name, bridge in started.items():
