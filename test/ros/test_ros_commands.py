@@ -78,7 +78,7 @@ def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
             client.publish(SPEED, Float64(data=200.0))
             pause(0.5)
         wait_until(lambda: refused(one))
-        client.wait_logged('commands thrown away: the exchange was 0')
+        client.wait_logged('1 command thrown away: the exchange was 0')
         cycles_pass(one)
         assert refused(one) == 1
         assert recorder.words()[0] == 1000

@@ -275,7 +275,7 @@ def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
         return sum(one.node.drives[name].session.statistics.commands_refused
                    for name in ('west', 'east', 'south', 'plain'))
     wait_until(refused)
-    client.wait_logged('commands thrown away: the exchange was 0')
+    client.wait_logged('1 command thrown away: the exchange was 0')
     assert refused() == 1
     assert speeds(one)['west'] == 0
 
