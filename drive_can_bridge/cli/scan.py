@@ -30,7 +30,7 @@ from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import (
     BusUnavailable, ConfigurationError, DriveCanError, TransportError)
 from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING
-from drive_can_bridge.core.messages import Sentence
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.text import column_lines
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.protocols.families import FAMILIES
@@ -346,7 +346,7 @@ def _bus(args: Namespace) -> BusConfiguration:
 
     :raises WrongUsage: an option that the bridge sets, or one that is missing.
     """
-    _find_bitrate(args)
+    args.doubt = _find_bitrate(args)
     options = dict(args.option)
     keys = {'interface': args.interface, 'channel': args.channel,
             'bitrate': args.bitrate or DEFAULT_BITRATE}
@@ -369,23 +369,26 @@ def _bus(args: Namespace) -> BusConfiguration:
     return found.buses['main']
 
 
-def _find_bitrate(args: Namespace) -> None:
-    """Set the bit rate to that of the interface, or to one that is assumed, with a warning."""
+def _find_bitrate(args: Namespace) -> Sentence:
+    """Set the bit rate to that of the interface, or to one that is assumed; return a warning."""
     if args.bitrates:
-        return
+        return NOTHING
     found = 0 if args.interface != 'socketcan' else next(
         (each.bitrate for each in kernel_interfaces() if each.name == args.channel), 0)
     if found:
-        if args.bitrate not in (None, found):
-            complain(command_sentences.bitrate_of_interface(args.bitrate, args.channel, found))
-        args.bitrate = found
+        given, args.bitrate = args.bitrate, found
+        if given not in (None, found):
+            return command_sentences.bitrate_of_interface(given, args.channel, found)
     elif args.bitrate is None and 'bitrate' in (adapter_keywords(args.interface) or ()):
         args.bitrate = DEFAULT_BITRATE
-        complain(command_sentences.bitrate_not_given(bitrate=DEFAULT_BITRATE))
+        return command_sentences.bitrate_not_given(bitrate=DEFAULT_BITRATE)
+    return NOTHING
 
 
 def _scan(args: Namespace, bus: BusConfiguration) -> int:
     with Ownership([(bus, ())], 'drive_can scan', END_FIRST):
+        if args.doubt:
+            complain(args.doubt)
         port = open_port(bus, args.clock)
         try:
             scan = BusScan(bus, port, args.clock.now)
