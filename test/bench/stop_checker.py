@@ -37,9 +37,9 @@ import time
 from typing import Any
 
 from builders import frame
+from coming import Coming
 from drives import Motor, PkwNode, ServoDrive, StandardDrive
 from kinds import KINDS, PERIOD
-from coming import Coming
 
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import Noted, StationFound, StationLost

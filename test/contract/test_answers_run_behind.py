@@ -13,11 +13,11 @@ import math
 from typing import Any
 
 from builders import frame
+from coming import Coming
 from extent import some
 import kinds
 import pytest
 from stops import UNANSWERED_CYCLES
-from coming import Coming
 
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import AnswerLate, Event, FrameRejected, Noted

@@ -13,11 +13,11 @@ from itertools import product
 from typing import Any
 
 from builders import ACTUAL, CONTROL, CURRENT, drive, frame, LIMIT, SPEED, STATUS, WORD
+from coming import Coming
 from drives import CannordDrive, ExtendedDrive, Motor, PkwNode, StandardDrive
 from exchange_builders import Bench
 from extent import some
 import pytest
-from coming import Coming
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlRequest

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from parameter_files import bridge_file
-from processes import Client, Processes
 import plant
+from processes import Client, Processes
 from slcan_peer import Answers, Peer
 from waiting import wait_for
 

@@ -12,10 +12,10 @@ from builders import (
 from conversation import Conversation
 import pytest
 from saying import may_run, says
-from stops import written_again
 from standard_builders import (
     ANSWER, ASK, LIMIT_ZERO, online, polling, round_of, SPEED_ZERO,
 )
+from stops import written_again
 from timeline import Timeline
 
 from drive_can_bridge.core.control import ControlAction
