@@ -11,7 +11,7 @@ from waiting import SLOWNESS, wait_for
 PERIOD = 0.1 * SLOWNESS
 #: fault -> what diagnostics and log say of it
 STILL_WORKS = {'duplicate': 'check for a second station with the same number',
-               'foreign': 'frames rejected, the last: ', 'drop=3': '', 'late=0.01': ''}
+               'foreign': 'frames? rejected, the last: ', 'drop=3': '', 'late=0.01': ''}
 #: fault -> why the drive is offline
 LOST = {'silent': 'no cyclic response', 'length=1': 'no cyclic response',
         'off': 'no cyclic response', 'forget': 'mapping differs|no cyclic response'}
