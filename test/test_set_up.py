@@ -27,8 +27,8 @@ with open(os.environ['INSTALLED'], 'a') as file:
     print(pathlib.Path(sys.prefix).name, sys.argv[-1], file=file)
 (pathlib.Path(sys.prefix) / 'bin' / 'drive_can').write_text(f'#!{sys.executable}')
 for line in os.environ.get('PIP_SAYS', '').splitlines():
-    if line == 'wait':      # until somebody has looked
-        open(os.environ['INSTALLED'] + '.go').close()
+    if line == 'wait':      # until somebody has looked, and let go
+        open(os.environ['INSTALLED'] + '.go').read()
     else:
         print(line, flush=True)
 sys.exit(int(os.environ.get('PIP_FAILS', 0)))
