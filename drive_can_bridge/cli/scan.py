@@ -39,7 +39,7 @@ from drive_can_bridge.protocols.scanner import Certainty, Scanner, Sighting
 from drive_can_bridge.transport import adapters
 from drive_can_bridge.transport.adapters import adapter_keywords, check_channel, check_interface
 from drive_can_bridge.transport.end_point import EndPoint
-from drive_can_bridge.transport.kernel_interfaces import kernel_interfaces
+from drive_can_bridge.transport.kernel_interfaces import kernel_interface
 from drive_can_bridge.transport.port import open_port
 
 #: share of the bus that questions and their answers may take at most
@@ -373,12 +373,11 @@ def _find_bitrate(args: Namespace) -> Sentence:
     """Set the bit rate to that of the interface, or to one that is assumed; return a warning."""
     if args.bitrates:
         return NOTHING
-    found = 0 if args.interface != 'socketcan' else next(
-        (each.bitrate for each in kernel_interfaces() if each.name == args.channel), 0)
-    if found:
-        given, args.bitrate = args.bitrate, found
-        if given not in (None, found):
-            return command_sentences.bitrate_of_interface(given, args.channel, found)
+    found = kernel_interface(args.channel) if args.interface == 'socketcan' else None
+    if found is not None and found.bitrate:
+        given, args.bitrate = args.bitrate, found.bitrate
+        if given not in (None, found.bitrate):
+            return command_sentences.bitrate_of_interface(given, args.channel, found.bitrate)
     elif args.bitrate is None and 'bitrate' in (adapter_keywords(args.interface) or ()):
         args.bitrate = DEFAULT_BITRATE
         return command_sentences.bitrate_not_given(bitrate=DEFAULT_BITRATE)

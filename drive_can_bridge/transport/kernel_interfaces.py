@@ -71,6 +71,10 @@ def kernel_interfaces() -> list[KernelInterface]:
         return []
 
 
+def kernel_interface(name: str) -> KernelInterface | None:
+    """Return the CAN interface of this name; None: there is none, or it is unknown."""
+    return next((each for each in kernel_interfaces() if each.name == name), None)
+
 
 def index_of(name: str) -> int:
     """Return the number of an interface, which it keeps when it is renamed; 0: there is none."""
@@ -113,8 +117,10 @@ def why_lost(name: str, index: int) -> str:
             return bus_sentences.interface_gone(name=name)
         return bus_sentences.interface_unknown(
             name=name, names=[each.name for each in kernel_interfaces()])
-    return next((bus_sentences.interface_down(name=name, how_up=each.how_up)
-                 for each in kernel_interfaces() if each.name == name and not each.up), '')
+    found = kernel_interface(name)
+    if found is not None and not found.up:
+        return bus_sentences.interface_down(name=name, how_up=found.how_up)
+    return ''
 
 
 def parsed(answer: bytes) -> tuple[list[KernelInterface], bool]:

@@ -31,6 +31,7 @@ from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.scanner import Certainty, Scanner, Sighting
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.simulation import Simulation
+from drive_can_bridge.transport import kernel_interfaces
 from drive_can_bridge.transport.kernel_interfaces import KernelInterface
 
 STORIES = stories(__file__, 'scan.yaml')
@@ -575,7 +576,7 @@ def test_the_bit_rate_of_the_interface_goes_before_any_other(
         opened.append(bus)
         raise BusUnavailable('not today')
     monkeypatch.setattr(scan_command, 'open_port', no_port)
-    monkeypatch.setattr(scan_command, 'kernel_interfaces', lambda: [
+    monkeypatch.setattr(kernel_interfaces, 'kernel_interfaces', lambda: [
         KernelInterface('can8', 8, True, 'can', 10_000),
         KernelInterface('can9', 9, True, 'can', set_to)])
     rate = () if given is None else ('--bitrate', given)
