@@ -17,7 +17,7 @@ from drive_can_bridge.configuration.profile_check import LoadedProfile
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import ALL_OPTIONS, complete, definition
 from drive_can_bridge.core import complaints
-from drive_can_bridge.core.adapter import AdapterTraits
+from drive_can_bridge.core.adapter import AdapterTraits, S7_RATES
 from drive_can_bridge.core.complaints import hint, suggestion, suggestion_of_profile
 from drive_can_bridge.core.configuration import (
     BusConfiguration, convertible_units, DriveConfiguration, ELECTRICAL_FREQUENCY,
@@ -114,7 +114,7 @@ def _check_adapter(tree: Tree, path: Path, values: dict[str, Any], adapters: Ada
         message = check(interface, values[key]) if values.get(key, '') != '' else None
         if message is not None:
             tree.wrong((*path, key), message)
-    if interface == 'slcan' and values['bitrate'] in (750_000, 800_000):
+    if interface == 'slcan' and values['bitrate'] in S7_RATES:
         tree.suspicious((*path, 'bitrate'), complaints.rate_of_two())
     return adapters.adapter_keywords(interface)
 

@@ -6,6 +6,9 @@ from typing import NamedTuple
 
 from drive_can_bridge.core.frame import Route
 
+#: bit/s that the SLCAN command S7 sets: in CANable 1 and 2; by LAWICEL's manual
+S7_RATES = 750_000, 800_000
+
 
 class Dropped(NamedTuple):
     """Frames that an adapter accepts and never sends."""

@@ -20,6 +20,7 @@ import termios
 import threading
 import tty
 
+from drive_can_bridge.core.adapter import S7_RATES
 from drive_can_bridge.core.errors import BusUnavailable
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.transport.end_point import EndPoint
@@ -130,7 +131,7 @@ class SlcanAdapter:
             elif self._bitrate is not None:
                 rate = BIT_RATES.get(command, self._bitrate)   # s…: not checked
                 # S7 is the one or the other, by adapter
-                self._set = self._bitrate if (rate, self._bitrate) == (750_000, 800_000) else rate
+                self._set = self._bitrate if (rate, self._bitrate) == S7_RATES else rate
         elif command == 'F' and not self.is_open:
             reply = REFUSED
         else:

@@ -22,6 +22,7 @@ import socket
 from typing import Any
 
 from drive_can_bridge.core import bus_sentences
+from drive_can_bridge.core.adapter import S7_RATES
 from drive_can_bridge.core.messages import NOTHING, Sentence
 
 #: what ends a line or packet that was begun and never finished, whatever is lacking, so that
@@ -52,9 +53,8 @@ REFUSED_MAX = 4
 REFUSED_TIME = 0.05
 #: s that each command to a serial adapter may take while it is opened
 OPEN_TIMEOUT = 0.5
-#: bit rates that python-can's class lacks: S7 is 800 kbit/s by LAWICEL's manual, and 750 kbit/s of
-#: CANable 1 and 2, the only one that python-can has it for
-MORE_RATES: dict[str, dict[int, str]] = {'slcan': {800_000: 'S7'}}
+#: bit rates that python-can's class lacks: it has S7 for that of CANable 1 and 2 only
+MORE_RATES: dict[str, dict[int, str]] = {'slcan': {S7_RATES[1]: 'S7'}}
 
 
 class AdapterAnswers:
