@@ -217,7 +217,6 @@ def _together(sinks: list[Sink]) -> Sink:
     return take
 
 
-
 def _live(args: Namespace, configuration: BridgeConfiguration, tracer: Tracer) -> int:
     with closing(Taps(configuration, args.clock)) as taps:
         try:

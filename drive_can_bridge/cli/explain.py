@@ -67,7 +67,7 @@ def _is_line(word: str) -> bool:
 def _explain(text: str, *, json: bool) -> int:
     """Show the rows of codes, or those of a text; return the exit code."""
     named, unknown = _named(text), list[str]()
-    rows = rows_of(text)
+    rows = named or rows_of(text)
     if not rows:    # a list of codes, of which some are none; mostly other words: a text
         words = text.split()
         unknown = [word for word in words if not _rows_of_code(word)]
@@ -200,7 +200,3 @@ def _pieces(text: str) -> Iterator[str]:
             yield counted(2, (spec or '')[1:]).replace('2', f'<{name}>')
         elif name and spec != '?':
             yield f'<{name}>'
-
-
-if __name__ == '__main__':
-    raise SystemExit('docs/messages.py writes docs/messages.md')

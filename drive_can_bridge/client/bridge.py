@@ -55,7 +55,6 @@ def role_of(message: Described) -> Role | None:
     return next((each for each in Role if each.value == role), None)
 
 
-
 def _number(facts: dict[str, str], key: str) -> int | None:
     return int(facts[key], 0) if key in facts else None
 

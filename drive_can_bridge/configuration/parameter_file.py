@@ -167,7 +167,6 @@ def read_sections(path: FilePath) -> tuple[list[NodeSection], list[Problem]]:
     return reader.sections, reader.problems
 
 
-
 def unseen_problems(paths: Iterable[FilePath], node: str,
                     ) -> tuple[list[Problem], list[Problem]]:
     """

@@ -136,7 +136,6 @@ class WriteRequest:
 Request = Union[ReadRequest, WriteRequest]
 
 
-
 @dataclass(slots=True)
 class RetryPolicy:
     """

@@ -160,7 +160,6 @@ def peer_of(peer: socket.socket) -> tuple[int, int]:
     return int.from_bytes(found[:4], sys.byteorder), int.from_bytes(found[4:8], sys.byteorder)
 
 
-
 def trusted_users() -> tuple[int, int]:
     """Return root, and the user of this process: no others are trusted, or obeyed."""
     return 0, os.geteuid()

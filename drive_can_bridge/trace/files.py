@@ -253,7 +253,6 @@ def _text_records(suffix: str, stream: Iterable[str], complain: Complain) -> Ite
         logger.removeHandler(heard)
 
 
-
 def _database_records(path: Path, complain: Complain) -> Iterator[Record]:
     """Read a database of python-can's writer."""
     with closing(sqlite3.connect(f'{path.absolute().as_uri()}?mode=ro', uri=True)) as database:

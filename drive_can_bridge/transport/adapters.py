@@ -132,7 +132,6 @@ def check_name(interface: str, name: str) -> Sentence | None:
     return None
 
 
-
 def serial_port(bus: BusConfiguration) -> tuple[str, ...]:
     """Return what the serial port of a bus is known by on this host; empty: there is none."""
     identity = identity_of(bus)

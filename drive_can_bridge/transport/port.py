@@ -474,7 +474,6 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
     return port
 
 
-
 def _check_carrier(channel: str) -> None:
     """
     Check that a controller takes part in the bus.

@@ -17,7 +17,6 @@ from drive_can_bridge.protocols.cia402.transactor import ObjectRead, Procedure, 
 from drive_can_bridge.protocols.transactor import Refused, Silence
 
 
-
 class SetUpState(Enum):
     """What the set-up has come to."""
 
