@@ -34,7 +34,7 @@ from drive_can_bridge.core.frame import (
 _FILE_HEADER = Struct('<4sL32x8H')
 _OBJECT = Struct('<4sHHLL')
 _STAMP = Struct('<LHHQ')
-_CONTAINER = Struct('<H6xL4x')
+_CONTAINER = Struct('<H14x')     # how it is packed; its size when unpacked, which may be wrong
 _PADDING_MAX = 8
 _SIGNATURE = b'LOBJ'
 
@@ -107,20 +107,21 @@ def _objects(file: BinaryIO, complain: Complain, passed: Counter[str]) -> Iterat
     """Yield all objects, those of containers in their places."""
     waiting = b''
     while head := file.read(_OBJECT.size):
+        padding = len(head) - len(head.lstrip(b'\0'))
+        head = head[padding:] + file.read(padding)
         signature, header_size, version, size, kind = (
             _OBJECT.unpack(head) if len(head) == _OBJECT.size else (b'', 0, 0, 0, 0))
         if signature != _SIGNATURE or size < _OBJECT.size:
             waiting = head
             break
         content = file.read(size - _OBJECT.size)
-        file.read(size % 4)
+        whole = len(head) + len(content) == size
         if kind == _CONTAINED:
-            unpacked, whole = _unpack(content)
+            unpacked, ended = _unpack(content)
+            whole &= ended
             waiting = yield from _contained(waiting + unpacked, complain, passed)
-        else:
-            whole = len(head) + len(content) == size
-            if whole:
-                yield from _parse(head + content, header_size, version, kind, passed)
+        elif whole:
+            yield from _parse(head + content, header_size, version, kind, passed)
         if not whole:
             waiting = head
             break
@@ -129,17 +130,18 @@ def _objects(file: BinaryIO, complain: Complain, passed: Counter[str]) -> Iterat
 
 
 def _unpack(container: bytes) -> tuple[bytes, bool]:
-    """Return the content of a container, and whether it is complete."""
+    """Return the content of a container, and whether its end was reached."""
     if len(container) < _CONTAINER.size:
         return b'', False
-    method, size = _CONTAINER.unpack_from(container)
-    unpacked = container[_CONTAINER.size:]
-    if method:
-        try:
-            unpacked = zlib.decompressobj().decompress(unpacked)
-        except zlib.error:
-            return b'', False
-    return unpacked, len(unpacked) >= size
+    method, = _CONTAINER.unpack_from(container)
+    packed = container[_CONTAINER.size:]
+    if not method:
+        return packed, True
+    unpacking = zlib.decompressobj()
+    try:
+        return unpacking.decompress(packed), unpacking.eof
+    except zlib.error:
+        return b'', False
 
 
 def _contained(data: bytes, complain: Complain, passed: Counter[str],

@@ -336,6 +336,14 @@ def test_an_object_may_go_on_in_the_next_container(tmp_path: Path) -> None:
     assert ([each.data for each in records], complaints) == (51 * [b'\x0A\x0B'], [])
 
 
+def test_a_container_ends_where_its_packed_bytes_end(tmp_path: Path) -> None:
+    """A time in the place of that size, and eight-byte filling, as vblf 0.3.1 writes them."""
+    packed = zlib.compress(an_object(1, MESSAGE)).ljust(44, b'\0')
+    part = b'LOBJ' + pack('<HHLLLLQ', 32, 1, 76, 10, 2, 0, 259_638) + packed + bytes(4)
+    records, complaints = read(blf(tmp_path / 'a.blf', 3 * part))
+    assert ([each.data for each in records], complaints) == (3 * [b'\x0A\x0B'], [])
+
+
 @pytest.mark.parametrize(('damage', 'frames'), [
     (lambda data: data[:-20], range(1, 50)), (lambda data: data[:170], range(50)),
     (lambda data: data[:150], range(1)), (lambda data: data + b'LOBJ', range(50, 51)),
