@@ -29,7 +29,7 @@ from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import (
     BusUnavailable, ConfigurationError, DriveCanError, TransportError)
-from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING
+from drive_can_bridge.core.frame import bits_of_exchange, Frame
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.text import column_lines
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
@@ -145,8 +145,7 @@ class BusScan:
 
     def _pause(self, frame: Frame) -> float:
         """Return the s from one question to the next: both it and its answer count."""
-        both = 2 * STUFFING * bits_on_bus(8, frame.extended)
-        return both / (LOAD_MAX * self._bus.bitrate)
+        return bits_of_exchange(extended=frame.extended) / (LOAD_MAX * self._bus.bitrate)
 
     def _hear(self, timeout: float) -> None:
         frame = self._port.receive(timeout)

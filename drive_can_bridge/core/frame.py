@@ -61,6 +61,11 @@ def bits_on_bus(length: int, extended: bool) -> int:
     return (67 if extended else 47) + 8 * length
 
 
+def bits_of_exchange(*, extended: bool) -> float:
+    """Return what a request and its answer of eight bytes each take of the bus, in bits."""
+    return 2 * STUFFING * bits_on_bus(8, extended)
+
+
 def worst_bits(length: int, *, extended: bool) -> int:
     """Return the longest that a frame can get by bit stuffing, interframe space included."""
     stuffed = (54 if extended else 34) + 8 * length

@@ -32,7 +32,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlRequest
 from drive_can_bridge.core.errors import TransportError
-from drive_can_bridge.core.frame import bits_on_bus, Frame, Route
+from drive_can_bridge.core.frame import bits_of_exchange, bits_on_bus, Frame, Route
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.member import BusListener, DriveListener, Member, STOP_MARGIN
@@ -111,25 +111,32 @@ class Router(Generic[Owner]):
         return table
 
 
-def stagger(periods: Sequence[float]) -> list[float]:
+def together(bitrate: int, *, extended: bool) -> int:
+    """Return how many exchanges the wire carries in a slot: so many drives may share a turn."""
+    return max(1, int(SLOT * bitrate / bits_of_exchange(extended=extended)))
+
+
+def stagger(periods: Sequence[float], sharing: int = 1) -> list[float]:
     """
     Return when in its period each drive has its turn, in s.
 
     Drives that are all served at the same instant wait for each other: on the wire, where the
     last of fifteen at 1 Mbit/s gets its request after two and its answer after four of five
     milliseconds, and again in this process, where each answer is published before the next one is
-    looked at. So drives of the same period are spread over it; but no finer than ``SLOT``,
-    because every turn costs a wake-up, and five exchanges at 1 Mbit/s fill a slot
-    (bench/README.md has what other slots cost).
+    looked at. So drives of the same period are spread over it; but no finer than ``SLOT``, and no
+    finer than the wire needs, because every turn costs a wake-up (bench/README.md has what other
+    slots cost).
 
     Drives of a period are placed in the order given; as many of them as need be share a slot.
+
+    :param sharing: so many drives may share a turn though there is time for another one.
     """
     groups: dict[float, list[int]] = {}
     for index, period in enumerate(periods):
         groups.setdefault(period, []).append(index)
     turns = [0.0] * len(periods)
     for period, members in groups.items():
-        slots = max(1, min(len(members), int(period / SLOT + 1e-6)))
+        slots = max(1, min(math.ceil(len(members) / sharing), int(period / SLOT + 1e-6)))
         for place, index in enumerate(members):
             turns[index] = place * slots // len(members) * period / slots
     return turns
@@ -222,7 +229,8 @@ class BusExchange:
         self.link = Link(bus, filters, self, clock, send_timeout=send_timeout,
                          stations=len(self._sessions), prepare_thread=prepare_thread,
                          opener=open_bus and (lambda: open_bus(bus)), keep_time=self._keep_time)
-        for session, phase in zip(sessions, stagger(periods)):
+        sharing = together(bus.bitrate, extended=any(route.extended for route in filters))
+        for session, phase in zip(sessions, stagger(periods, sharing)):
             session.phase = phase
         self.periodic_task: PeriodicTask | None = None
         self._wake = clock.wake_event()

@@ -103,7 +103,7 @@ class Bench:
     """An exchange on the bench."""
 
     def __init__(self, *drives: DriveConfiguration, sessions: Sequence[Session] = (),
-                 clock: Clock | None = None) -> None:
+                 clock: Clock | None = None, bitrate: int = 125_000) -> None:
         drives = drives or (drive(name='first', station=1), drive(name='second', station=2))
         self.now = 10.0
         self.step = 0.0
@@ -113,8 +113,8 @@ class Bench:
                        for entry in drives]
         self.bus_notes = BusNotes()
         self.exchange = BusExchange(
-            BusConfiguration('main', 'virtual', 'x'), self.sessions, self.routes, self.bus_notes,
-            clock or HandClock(self.clock),
+            BusConfiguration('main', 'virtual', 'x', bitrate=bitrate), self.sessions,
+            self.routes, self.bus_notes, clock or HandClock(self.clock),
             overheard=[FAMILIES[entry.protocol].overheard(entry) for entry in drives])
         self.link = FakeLink()
         self.exchange.link = self.link
