@@ -128,6 +128,10 @@ adapter_echoes = Text(
     'the adapter hands back what it was handed to send: one frame is dropped for each; look for a '
     'setting of it that ends this',
     do='nothing, or switch its echo off (docs/adapters.md)')
+interface_at_other_bitrate = Text(
+    'bitrate: {given} does not change the interface: {name} is set to {bitrate} bit/s '
+    '(ip link set {name} down, then: ip link set {name} up type can bitrate {given})',
+    do='write the bit rate of the drives as bitrate, or set the interface to it')
 library_lines_left_out = Text(
     '{count} more lines of libraries left out',
     do='see what the lines before say; --ros-args --log-level shows no more')

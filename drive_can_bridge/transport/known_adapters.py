@@ -74,9 +74,9 @@ class Row:
 ROWS: tuple[Row, ...] = (
     # -- the kernel
     Row('socketcan', 'a CAN controller of Linux: on the board, PCI, SPI', 'socketcan', 'can0',
-        "bit rate and restart are the interface's, not the file's; stamps are the host's; what "
-        'was sent waits in the kernel until a node acknowledges it; goes bus-off for good '
-        'unless set to restart',
+        "bit rate and restart are the interface's, not the file's (another bit rate there is a "
+        "warning); stamps are the host's; what was sent waits in the kernel until a node "
+        'acknowledges it; goes bus-off for good unless set to restart',
         '`ip link set can0 type can bitrate 500000 restart-ms 100`, `ip link set can0 up`',
         f'{REAL}: vcan, SJA1000 (emulated), the slcan driver',
         listen_only='"ip link set can0 type can listen-only on"'),

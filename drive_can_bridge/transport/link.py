@@ -311,7 +311,7 @@ class Link:
                 if port is None or self._ended():
                     return
                 self.taken = False
-                self._whereabouts.opened()
+                remark = self._whereabouts.opened()
                 port.error_witness = self.error_witness
                 port.tell = self._tell_once
                 frame = port.receive(RECEIVE_TIMEOUT)
@@ -324,6 +324,8 @@ class Link:
                 opened = True
                 self._reported = ''
                 self._listener.bus_opened()
+                if remark:
+                    self._tell_once(remark)
                 self._tell_tried()
                 # it came before anything was asked: it must not pass for the answer
                 port.age = self._now() - received_at

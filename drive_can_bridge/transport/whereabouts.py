@@ -5,7 +5,10 @@ from drive_can_bridge.core import bus_sentences
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.transport.bus_identity import adapter_of
 from drive_can_bridge.transport.failures import in_words
-from drive_can_bridge.transport.kernel_interfaces import index_of, why_lost
+from drive_can_bridge.transport.kernel_interfaces import index_of, kernel_interface, why_lost
+
+#: share by which a controller's bit rate may be off, since its oscillator allows no nearer one
+_OFF = 0.01
 
 
 class Whereabouts:
@@ -19,10 +22,17 @@ class Whereabouts:
         self._bus = bus
         self._number = 0
 
-    def opened(self) -> None:
-        """Record that it is there."""
-        if self._bus.interface == 'socketcan':
-            self._number = index_of(str(self._bus.channel))
+    def opened(self) -> str:
+        """Record that it is there; return what people should know of it, '': nothing."""
+        if self._bus.interface != 'socketcan':
+            return ''
+        name, given = str(self._bus.channel), self._bus.bitrate
+        self._number = index_of(name)
+        found = kernel_interface(name)
+        if found is None or not found.bitrate or abs(found.bitrate - given) <= _OFF * given:
+            return ''
+        return bus_sentences.interface_at_other_bitrate(
+            given=given, name=name, bitrate=found.bitrate)
 
     def reason(self, error: BaseException, *, absent: bool) -> str:
         """

@@ -124,6 +124,16 @@ def test_controller_in_trouble(processes: Processes, client: Client, namespace: 
     wait_for_end(lambda: [line for line in adapter.lines if line.startswith('T')], [NEUTRAL] * 3)
 
 
+def test_another_bit_rate_than_that_of_the_interface(
+        processes: Processes, namespace: str, tmp_path: Path, adapter: KernelAdapter) -> None:
+    file = bridge_file(tmp_path, interface='socketcan', channel=adapter.name,
+                       bus={'bitrate': 500_000}, drives=DRIVES)
+    bridge = processes.bridge(file, namespace)
+    bridge.error(f'bus main: bitrate: 500000 does not change the interface: {adapter.name} is set '
+                 f'to 125000 bit/s')
+    assert bridge.end() == 0
+
+
 def test_a_scan_says_what_is_wrong_with_the_bus(adapter: KernelAdapter,
                                                 capsys: pytest.CaptureFixture[str]) -> None:
     scan = ['scan', '--interface', 'socketcan', '--channel', adapter.name, '--bitrate', '125000']

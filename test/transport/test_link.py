@@ -3,6 +3,7 @@
 
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,11 @@ from drive_can_bridge.core.bus_sentences import adapter_gone
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.transport import kernel_interfaces
 from drive_can_bridge.transport import link as link_module
 from drive_can_bridge.transport.end_point import Counts, EndPoint
 from drive_can_bridge.transport.error_frames import BusError
+from drive_can_bridge.transport.kernel_interfaces import KernelInterface
 from drive_can_bridge.transport.link import Link, RECEIVE_TIMEOUT
 from drive_can_bridge.transport.port import open_port
 
@@ -183,6 +186,25 @@ def test_what_is_there_already_can_be_looked_at(make: Callable[..., Bench],
     assert heard == [ANSWER]
     assert found == [(FRAME, 0.25), None, None]
     assert bench.link.frames_received == 2
+
+
+@pytest.mark.parametrize(('interface', 'set_to', 'told'), [
+    ('socketcan', 250_000, [bus_sentences.interface_at_other_bitrate(125_000, 'can9', 250_000)]),
+    ('socketcan', 125_000, []),
+    ('socketcan', 125_313, []),     # as near as the oscillator of its controller allows
+    ('socketcan', 0, []),           # vcan
+    ('fake', 250_000, [])])
+def test_a_bit_rate_that_the_interface_does_not_have_is_said_once(
+        interface: str, set_to: int, told: list[str], make: Callable[..., Bench],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernel_interfaces, 'kernel_interfaces', lambda: [
+        KernelInterface('can8', 8, True, 'can', 10_000),
+        KernelInterface('can9', 9, True, 'can', set_to)])
+    bench = make(bus=replace(BUS, interface=interface, channel='can9', bitrate=125_000))
+    bench.port.coming.append(BusUnavailable('down'))
+    bench.opened(2)
+    bench.link.stop()
+    assert bench.listener.told == ['opened', *told, 'lost: down', 'opened']
 
 
 def test_open_read_send_close(make: Callable[..., Bench]) -> None:
