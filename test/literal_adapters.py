@@ -16,6 +16,8 @@ import socket
 import threading
 import tty
 
+from waiting import DEADLINE
+
 HEX = '0123456789ABCDEF'
 
 
@@ -256,6 +258,9 @@ class Attached:
     :ivar written: everything that it was handed.
     """
 
+    #: stands behind what :meth:`handled` waits for
+    _MARK = b'<here>'
+
     def __init__(self, take: Callable[[bytes], bytes]) -> None:
         self.written = b''
         self._take = take
@@ -263,6 +268,7 @@ class Attached:
         tty.setraw(self._slave)
         self.path = os.ttyname(self._slave)
         self._end, self._stop = os.pipe()
+        self._handled, self._marked = threading.Event(), False
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
 
@@ -272,9 +278,24 @@ class Attached:
             if self._end in ready:
                 return
             data = os.read(self.master, 65536)
+            if marked := self._marked:
+                while not data.endswith(self._MARK):
+                    data += os.read(self.master, 65536)
+                data = data.removesuffix(self._MARK)
+                self._marked = False
             self.written += data
             if answer := self._take(data):
                 os.write(self.master, answer)
+            if marked:
+                self._handled.set()
+
+    def handled(self) -> bytes:
+        """Return what it was handed, when all that was written is."""
+        self._handled.clear()
+        self._marked = True
+        os.write(self._slave, self._MARK)
+        assert self._handled.wait(DEADLINE)
+        return self.written
 
     def close(self) -> None:
         """Take it away."""

@@ -51,8 +51,8 @@ _EARLY_MAX, _EARLY_TIME = 1000, 0.1
 _EARLY_LOOK = 100
 # So many frames may be confirmed at once: what a terminal keeps.
 _UNCONFIRMED_MAX = 4096
-# Reads of a serial adapter's answers to the commands that opened it, and s for each.
-_ANSWER_LOOKS, _ANSWER_TIME = 8, 0.02
+# s for a serial adapter's answers to the commands that opened it, and s for one look.
+_ANSWER_TIME, _ANSWER_LOOK = 0.16, 0.02
 # Data bytes of a classical CAN frame.
 _LENGTH_MAX = 8
 # s that the last command to a serial adapter may take.
@@ -248,11 +248,15 @@ class Port(EndPoint):
         """
         if self._answers is None:
             return
-        for _ in range(_ANSWER_LOOKS):
-            answered = self._answers.answered
-            self.receive(_ANSWER_TIME)
-            if answered and answered == self._answers.answered:
+        left = _ANSWER_TIME
+        while left > 0.0:
+            answered, began = self._answers.answered, self._now()
+            self.receive(_ANSWER_LOOK)
+            # another one may come: the first ones were of earlier commands then
+            if self._answers.complete and answered == self._answers.answered:
                 break
+            # a process that did not run meanwhile has not looked for longer
+            left -= min(self._now() - began, _ANSWER_LOOK)
         refusal = self._answers.refusal(bitrate)
         if refusal:
             raise BusUnavailable(refusal)

@@ -89,6 +89,11 @@ class AdapterAnswers:
         """How many commands of the opening were answered; some adapters answer none."""
         return len(self._said)
 
+    @property
+    def complete(self) -> bool:
+        """Whether each command of the opening may have been answered."""
+        return self._commands is not None and len(self._said) >= len(self._commands)
+
     def refusal(self, bitrate: int) -> Sentence:
         """
         End the opening; return what was refused, '' for nothing known.

@@ -46,27 +46,18 @@ def _written() -> tuple[bytes, bytes, bytes]:
     attached = Attached(lambda data: b'')
     try:
         port = opened(attached.path)
-        at_opening = until_still(attached)
+        at_opening = attached.handled()
         port.close()
-        at_closing = until_still(attached)[len(at_opening):]
+        at_closing = attached.handled()[len(at_opening):]
         attached.written = b''
         port = opened(attached.path)
-        until_still(attached)
+        attached.handled()
         attached.written = b''
         port._lost = True       # as after a write that did not get through
         port.close()
-        return at_opening, at_closing, until_still(attached)
+        return at_opening, at_closing, attached.handled()
     finally:
         attached.close()
-
-
-def until_still(attached: Attached) -> bytes:
-    """Return what has arrived when nothing more does."""
-    before = None
-    while before != attached.written:
-        before = attached.written
-        REAL.wait(REAL.now() + 0.05)
-    return attached.written
 
 
 def lines_of(data: bytes) -> list[bytes]:
@@ -127,15 +118,15 @@ def test_a_read_behind_a_process_that_died(firmware: type[Firmware]) -> None:
     try:
         port = opened(attached.path)
         port.send(Frame(0x601, bytes.fromhex('4064600000000000'), False), 0.1)
-        until_still(attached)
+        attached.handled()
         port.close()
-        until_still(attached)
+        attached.handled()
         assert adapter.frames == ['601#4064600000000000']
         for _ in range(2):      # lost, and opened again
             port = opened(attached.path)
             port._lost = True
             port.close()
-        until_still(attached)
+        attached.handled()
         assert adapter.frames == ['601#4064600000000000']
         assert not adapter.channel_open
     finally:
@@ -214,14 +205,14 @@ def test_half_packets_come_to_nothing(interface: str, frames: object, text: str)
     attached = Attached(lambda data: data if interface == 'robotell' else b'')
     try:
         port = opened(attached.path, interface)
-        at_opening = until_still(attached)
+        at_opening = attached.handled()
         attached.written = b''
         port.send(Frame(0x123, b'\x01\x02', False), 0.1)
-        sent = until_still(attached)
+        sent = attached.handled()
         attached.written = b''
         port._lost = True
         port.close()
-        behind_a_loss = until_still(attached)
+        behind_a_loss = attached.handled()
     finally:
         attached.close()
     assert frames(sent) == ['123#0102']

@@ -704,6 +704,56 @@ def test_listen_only_is_an_opening() -> None:
     assert told('C S4 L L', '+++-') == ''
 
 
+class Answers(FakeBus):
+    """
+    An adapter that answers its opening, ``C S4 O O``, by a script.
+
+    ``+`` and ``-`` are CR and BEL, ``f`` is a frame; in a look of ``_`` nothing comes, and in one
+    of ``!`` this process does not run for a second. Behind the script nothing comes.
+    """
+
+    def __init__(self, script: str) -> None:
+        super().__init__()
+        self.now, self.script = 0.0, deque(script)
+        answers = AdapterAnswers()
+        for command in ('C', 'S4', 'O', 'O'):
+            answers.commanded(command)
+        self.drive_can_below = Below(None, None, b'', answers)
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        step = self.script.popleft() if self.script else '_'
+        if step == 'f':
+            self.now += 0.001
+            return can.Message(), False
+        if step in '+-':
+            self.drive_can_below.answers.take(      # type: ignore[union-attr]
+                '\r' if step == '+' else '\a', self.now)
+        else:
+            self.now += 1.0 if step == '!' else timeout or 0.0
+        return None, False
+
+
+@pytest.mark.parametrize(('script', 'seconds', 'why'), [
+    ('', 0.16, ''), ('++++', 0.02, ''), ('-++-', 0.02, ''),
+    ('+++', 0.16, ''),          # CANable 2.5
+    ('+__-+-', 0.06, 'the adapter refuses bit rate 125000'),
+    ('_______+-+-', 0.16, 'the adapter refuses bit rate 125000'),
+    ('+!-+-', 1.02, 'the adapter refuses bit rate 125000'),
+    ('+-+fffffffff-', 0.03, 'the adapter refuses bit rate 125000'),
+    ('--++--', 0.02, 'the adapter does not open'),
+    ('f' * 999, 0.16, ''),
+], ids=lambda value: value[:15] if isinstance(value, str) else None)
+def test_late_answers_are_awaited(script: str, seconds: float, why: str) -> None:
+    bus = Answers(script)
+    port = Port(bus, HandClock(lambda: bus.now))
+    if why:
+        with pytest.raises(BusUnavailable, match=f'^{why}$'):
+            port.await_answers(125_000)
+    else:
+        port.await_answers(125_000)
+    assert bus.now == pytest.approx(seconds, abs=0.025)
+
+
 class DoesNotOpen(Usbtin):
     """One whose controller does not come up."""
 
