@@ -207,8 +207,9 @@ class WatchedNode:
         return sentences.node_state(self.state.text)
 
     def said(self, now: float) -> NmtState | None:
-        """Return the state in its last heartbeat; None: none is recent."""
-        recent = now - self._said_at <= (self.heartbeat_timeout or BELIEF_TIME)
+        """Return the state in its last heartbeat; None: none is recent, or it has left that."""
+        recent = now - self._said_at <= (self.heartbeat_timeout or BELIEF_TIME) and not (
+            self.state is NmtState.STOPPED and max(self.heard_at, self.pdo_at) > self._said_at)
         return self.state if recent else None
 
     def said_since(self, at: float) -> NmtState | None:

@@ -237,7 +237,8 @@ class Cia402Session(Session):
             now = yield again
         while True:
             self._heartbeats.handle_timer(now)     # to be heard before the drive is to watch it
-            if self._stopped_by_nmt(now) and now >= node_set_up.nmt_at + START_PERIOD:
+            if self._stopped_by_nmt(now) and not self._stop.running and (  # that wakes it itself
+                    now >= node_set_up.nmt_at + START_PERIOD):
                 node_set_up.wake(now)
             outcome: SetUpOutcome = yield node_set_up.run()
             now, found, text = self._channel.now, outcome.found, outcome.text
@@ -481,6 +482,7 @@ class Cia402Session(Session):
                 state is NmtState.STOPPED or not self.exchange.leaving
                 and now > self._node_set_up.nmt_at + START_PAUSE + START_SPACING
                 and (self.online or not self._node_set_up.starting(now))):
+            self.duty.happened(Happened.SILENT)     # to cycles that it was told by
             self._close(sentences.node_state(state.text), now, START_PERIOD)
         else:
             self._again.sign_of_life(now, hurry=True)

@@ -6,8 +6,9 @@ import math
 from builders import frame, read
 import pytest
 from saying import says
-from servo_builders import Axis, FITS, POSITION
+from servo_builders import Axis, FITS, PERIOD, POSITION
 
+from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Noted, StationLost
 from drive_can_bridge.core.frame import Frame
 
@@ -61,8 +62,40 @@ class TestStoppedInMotion:
         assert {time for time, _ in told(axis)[:2]} == {round(at, 6)}
         assert axis.drive.state == axis.drive.ON
         assert doubts(axis) == []
+        assert axis.log.count((round(at, 6), PRE_OPERATIONAL)) == 1
+        # its next heartbeat may be far away: that it answers shows that it is not stopped
+        axis.beat_at = math.inf
+        axis.take()
+        axis.deliver(axis.talk.submits(read(POSITION), axis.now))
+        assert '605#4064600000000000' in axis.take()
+        axis.beat_at = axis.now + 0.05
         axis.live(1.5)
         assert axis.session.online
+
+    @pytest.mark.parametrize('cycles', [0, 1, 2])
+    def test_its_heartbeat_says_so_behind_cycles_of_its_stop(self, cycles: int) -> None:
+        axis = running()
+        stopped(axis, tells=False)
+        while axis.session.online:
+            axis.live(0.001)
+        axis.live(0.002 + cycles * PERIOD)
+        axis.take()
+        at = round(axis.now, 6)
+        axis.says('705#04')
+        assert told(axis)[:2] == [(at, PRE_OPERATIONAL), (at, DISABLE)]
+        assert axis.drive.state == axis.drive.ON
+
+    @pytest.mark.parametrize('beat, first', [('705#04', PRE_OPERATIONAL), ('705#7F', DISABLE)])
+    def test_it_was_disabled_a_moment_before(self, beat: str, first: str) -> None:
+        axis = running()
+        axis.drive.takes(Frame(0, b'\x02\x05' if first != DISABLE else b'\x80\x05', False))
+        assert axis.asks(ControlAction.DISABLE, wait=PERIOD + 0.001) == []
+        axis.take()
+        axis.says(beat)
+        sent = [text for _, text in told(axis)]
+        assert sent[0] == first
+        assert DISABLE in sent[:2]
+        assert axis.drive.state == axis.drive.ON
 
     def test_a_user_reads_at_that_moment(self) -> None:
         axis = running()
