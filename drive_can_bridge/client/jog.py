@@ -388,10 +388,10 @@ class Jog:
         self._answers += 1
         if self._answers < 2:   # the first one may answer the exchange before
             return
-        if self._is_sent(self._target.value):
-            self._value_answered = True
-        elif self._phase is _Phase.ENDING and self._is_sent(self._target.neutral):
+        if self._phase is _Phase.ENDING and self._is_sent(self._target.neutral):
             self._neutral_answered = True
+        elif self._is_sent(self._target.value):
+            self._value_answered = True
 
     def _is_sent(self, value: Value) -> bool:
         """Return whether the bridge sent a value last: the same raw integer."""

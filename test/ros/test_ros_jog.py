@@ -57,6 +57,12 @@ def test_holds_the_value_and_ends_with_neutral(bridge: StartBridge, run: Run) ->
     assert speeds(one) == [0.0]
 
 
+def test_neutral_is_a_value_too(bridge: StartBridge, run: Run) -> None:
+    enabled(bridge, run)
+    code, lines, errors = run('jog', 'lift', '0', '--yes', '--for', '1')
+    assert (code, lines[-1], errors) == (0, 'lift: 0 rpm was sent and answered, then neutral', '')
+
+
 def test_no_line_is_empty_before_the_first_values(
         bridge: StartBridge, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     enabled(bridge, run)
