@@ -22,7 +22,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.exchange.one_master import AnotherMaster, END_FIRST, Ownership
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.scanner import Finding, Prober, Question
-from drive_can_bridge.transport.end_point import EndPoint
+from drive_can_bridge.transport.end_point import arrived, EndPoint
 from drive_can_bridge.transport.port import open_port
 
 #: s to listen for another master before the first question
@@ -92,16 +92,16 @@ class Asker:
         """
         refusal: DriveCanError | None = None
         for _ in range(retries + 1):
-            self._drain()
+            for _ in arrived(self._receive, self._clock):
+                pass    # it came before the question, and answers nothing
             try:
                 self._port.send(question.frame, _SEND_TIMEOUT)
                 refusal = None
             except (TransportError, BusUnavailable) as error:
                 refusal = error
             end = self._clock() + timeout
-            while self._clock() < end:
-                frame = self._receive(_PATIENCE)
-                if frame is not None and question.answers(frame):
+            for frame in self._heard(end):
+                if question.answers(frame):
                     return frame
         if refusal is not None:
             raise TransportError(command_sentences.probe_unacknowledged(
@@ -110,10 +110,13 @@ class Asker:
             self.listen(question.quiet)
         return None
 
-    def _drain(self) -> None:
-        """Discard what came before the question: it answers nothing."""
-        while self._receive(0.0) is not None:
-            pass
+    def _heard(self, end: float) -> Iterator[Frame]:
+        """Yield what is received until then."""
+        while self._clock() < end:
+            frame = self._receive(_PATIENCE)
+            if frame is not None:
+                yield frame
+        yield from arrived(self._receive, self._clock)
 
     def _receive(self, timeout: float) -> Frame | None:
         frame = self._port.receive(timeout)

@@ -38,7 +38,7 @@ from drive_can_bridge.protocols.family import ScanEntry
 from drive_can_bridge.protocols.scanner import Certainty, Scanner, Sighting
 from drive_can_bridge.transport import adapters
 from drive_can_bridge.transport.adapters import adapter_keywords, check_channel, check_interface
-from drive_can_bridge.transport.end_point import EndPoint
+from drive_can_bridge.transport.end_point import arrived, EndPoint
 from drive_can_bridge.transport.kernel_interfaces import kernel_interface
 from drive_can_bridge.transport.port import open_port
 
@@ -49,6 +49,8 @@ LAST_ANSWER = 0.3
 #: s that a receive may block
 _PATIENCE = 0.005
 _SEND_TIMEOUT = 0.05
+#: s since the begin of the last look, behind which there may be more to hear than one frame
+_LATE = 0.15
 #: frames in a row that the bus refuses, until nothing more is sent
 _REFUSED_MAX = 5
 #: bit/s where nobody says another rate
@@ -73,6 +75,7 @@ class BusScan:
                                          for name, family in FAMILIES.items()}
         self.frames = 0
         self.trouble = ''
+        self._looked = clock()
 
     @property
     def master(self) -> str:
@@ -104,6 +107,7 @@ class BusScan:
         end = self._clock() + seconds
         while self._clock() < end:
             self._hear(_PATIENCE)
+        self._catch_up()
 
     def ask(self, protocol: str) -> None:
         """
@@ -119,9 +123,13 @@ class BusScan:
         due = self._clock()
         quiet_at = 0.0
         refused = 0
-        # a node that was asleep may boot meanwhile
-        while not self.master and not self.trouble and not self.forbidden(scanner):
+        while True:
             now = self._clock()
+            if now - self._looked > _LATE:
+                self._catch_up()
+            # a node that was asleep may boot meanwhile
+            if self.master or self.trouble or self.forbidden(scanner):
+                return
             if now < due:
                 self._hear(min(_PATIENCE, due - now))
                 continue
@@ -147,10 +155,19 @@ class BusScan:
         """Return the s from one question to the next: both it and its answer count."""
         return bits_of_exchange(extended=frame.extended) / (LOAD_MAX * self._bus.bitrate)
 
+    def _catch_up(self) -> None:
+        """Hear what has come while this process did not run: before more is asked, or the end."""
+        self._looked = self._clock()
+        for frame in arrived(self._port.receive, self._clock):
+            self._take(frame)
+
     def _hear(self, timeout: float) -> None:
+        self._looked = self._clock()
         frame = self._port.receive(timeout)
-        if frame is None:
-            return
+        if frame is not None:
+            self._take(frame)
+
+    def _take(self, frame: Frame) -> None:
         self.frames += 1
         now = self._clock() - self._port.age
         for scanner in self.scanners.values():

@@ -2,13 +2,37 @@
 """The interface of an open bus, as a link uses it."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from operator import add, sub
 from typing import NamedTuple
 
 from drive_can_bridge.compiled import mypyc_attr
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.transport.error_frames import BusError, ERROR_ACTIVE
+
+# s for what has arrived already, and looks in a row in which nothing is found: an adapter's own
+# answers stand between the frames.
+_CATCH_UP, _EMPTY_LOOKS = 0.1, 8
+
+
+def arrived(receive: Callable[[float], Frame | None], now: Callable[[], float]) -> Iterator[Frame]:
+    """
+    Yield the frames that have arrived already.
+
+    Who concludes something from silence asks for them first: a process that did not run meanwhile
+    has not looked.
+
+    :param receive: of an end point.
+    :param now: the steady time.
+    """
+    end, empty = now() + _CATCH_UP, 0
+    while empty < _EMPTY_LOOKS and now() < end:
+        frame = receive(0.0)
+        if frame is None:
+            empty += 1
+        else:
+            empty = 0
+            yield frame
 
 
 class Counts(NamedTuple):

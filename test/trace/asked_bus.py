@@ -17,6 +17,8 @@ class AskedBus(EndPoint):
     :param device: says what is answered to a frame.
     :ivar sent: what was sent, :ivar times: and when.
     :ivar arriving: what is heard next.
+    :ivar late: what has come, and is heard next, when this process has stood still in its next
+        look, for ``stall`` s; where that is not 0, answers come so.
     """
 
     def __init__(self, device: Callable[[Frame], Iterable[Frame]]) -> None:
@@ -26,6 +28,8 @@ class AskedBus(EndPoint):
         self.sent: list[Frame] = []
         self.times: list[float] = []
         self.arriving: deque[Frame] = deque()
+        self.late: list[Frame] = []
+        self.stall = 0.0
 
     def clock(self) -> float:
         return self.now
@@ -34,13 +38,18 @@ class AskedBus(EndPoint):
         if self.arriving:
             self.now += 0.001
             return self.arriving.popleft()
+        if self.late and timeout:
+            self.now += self.stall
+            self.arriving.extend(self.late)
+            self.late.clear()
+            return None
         self.now += max(timeout, 1e-4)
         return None
 
     def send(self, frame: Frame, timeout: float) -> None:
         self.sent.append(frame)
         self.times.append(self.now)
-        self.arriving.extend(self._device(frame))
+        (self.late if self.stall else self.arriving).extend(self._device(frame))
 
     def close(self) -> None:
         pass

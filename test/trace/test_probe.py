@@ -155,6 +155,13 @@ def test_datamodel_moved(request_map: str, response_map: str, moved: int) -> Non
 
 
 
+def test_who_did_not_run_for_a_while_has_not_heard_silence() -> None:
+    device = maps('0031003200000000', '00D000D100D20000', -1)
+    prompt, late = Bench(device), Bench(device)
+    late.stall = 1.0
+    assert late.probe(LIFT) == prompt.probe(LIFT) != Bench(lambda frame: []).probe(LIFT)
+
+
 def test_silence_after_a_read_whose_late_answer_nobody_could_tell() -> None:
     quiet = {drive.protocol: next(FAMILIES[drive.protocol].make_prober(drive).converse()).quiet
              for drive in (LIFT, ELEVEN)}

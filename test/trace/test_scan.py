@@ -134,6 +134,28 @@ def test_drives_are_found() -> None:
     assert not scan.master
 
 
+def test_who_did_not_run_for_a_while_has_not_heard_silence() -> None:
+    bench = Bench(datamodel_extended(127))
+    bench.stall = 1.0
+    scan = bench.scan()
+    bench.late.append(Frame(0x123, b'', False))
+    scan.listen(0.5)
+    assert scan.frames == 1
+    scan.ask('datamodel_extended')
+    assert [each.text for each in scan.sightings] == [SAID['maps']]
+
+
+def test_what_came_meanwhile_is_heard_before_more_is_asked() -> None:
+    bench = Bench(canopen(9))
+    bench.stall = 1.0
+    scan = bench.scan()
+    bench.late.append(Frame(0x709, b'\x05', False))
+    scan.listen(0.5)
+    assert scan.nodes
+    scan.ask('cannord')
+    assert not bench.sent
+
+
 def frame_of(text: str) -> Frame:
     """Return a frame as candump writes it: eight digits are an identifier of 29 bits."""
     identifier, _, data = text.partition('#')
