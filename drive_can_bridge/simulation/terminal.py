@@ -235,9 +235,13 @@ class SlcanTerminal(EndPoint):
         path.parent.mkdir(parents=True, exist_ok=True)
         # a name of its own first: others find the old link or the new one, never none
         temporary = path.with_name(f'.{path.name}.{os.getpid()}')
-        temporary.unlink(missing_ok=True)
-        temporary.symlink_to(self.path)
-        temporary.replace(path)
+        try:
+            temporary.unlink(missing_ok=True)
+            temporary.symlink_to(self.path)
+            temporary.replace(path)
+        except OSError as error:
+            error.filename = str(path)      # not the terminal, nor the other name
+            raise
         self._links.append(path)
 
     def close(self) -> None:

@@ -172,6 +172,7 @@ def refused(capsys: pytest.CaptureFixture[str], directory: Path, *arguments: str
     (('--interface', 'nonsense'), 1,
      "drive_can simulate: --interface: 'nonsense' is no interface of python-can, allowed: "),
     (('--pty-link', '/dev/null/x'), 1, '/dev/null'),
+    (('--pty-link', '/proc'), 1, 'drive_can simulate: /proc/main: '),
     (('--params-file', '/nowhere.yaml'), 1, 'drive_can simulate: /nowhere.yaml: No such file'),
     (('--params-file', '/dev/null'), 1, 'drive_can simulate: /dev/null: not a regular file'),
 ])
