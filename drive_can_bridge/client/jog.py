@@ -349,8 +349,12 @@ class Jog:
                 return
             self._heard_at = self._graph.now()
             text, publishers = (value_of(value) for value in answer.values)
-            self._armed = any(each.get('armed') is True for each in _read(text) or ()
-                              if each['name'] == self._target.parameter.name)
+            before, self._armed = self._armed, any(
+                each.get('armed') is True for each in _read(text) or ()
+                if each['name'] == self._target.parameter.name)
+            # twice, because what is sent then says it better, where that can be seen
+            if self._phase is _Phase.MOVING and not (before or self._armed):
+                self._end(sentences.jog_no_longer(state='armed'))
             who = list(_others(publishers, self._own_name))
             if who:
                 self._end(sentences.jog_commanded(who=who))

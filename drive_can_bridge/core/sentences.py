@@ -958,8 +958,8 @@ jog_bridge_silent = Text(
 jog_unanswered = Text(
     'no exchange that carried {value} was answered', do='see diagnostics of the drive')
 jog_neutral_unseen = Text(
-    'neutral was published, and not seen to be sent: command_timeout stops it',
-    do='see diagnostics of the drive')
+    'neutral was published, and no answer shows that the drive has it: it may still be running',
+    do=f'{STANDS_STILL}; see diagnostics of the drive')
 jog_interrupted = Text('interrupted', do='nothing: the drive got neutral')
 jog_done = Text('{value} was sent and answered, then neutral', do='nothing')
 

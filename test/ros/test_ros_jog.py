@@ -237,6 +237,23 @@ def test_ends_when_the_drive_is_disabled(bridge: StartBridge, run: Run,
     assert speeds(one) == [0.0] and len(lines) < 10
 
 
+def test_ends_when_the_bridge_alone_says_that_it_is_disarmed(
+        bridge: StartBridge, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its bus is lost, and ``~/online`` is called otherwise."""
+    one = enabled(bridge, run)
+
+    def lose(found: jog.Jog, now: float) -> None:
+        if found._value_answered and found._inboxes:
+            found._inboxes = ()
+            one.node.drives['lift'].session.setpoints.disarm()
+        judge(found, now)
+    judge = jog.Jog._judge
+    monkeypatch.setattr(jog.Jog, '_judge', lose)
+    code, _, errors = run('jog', 'lift', '300', '--yes', '--for', '5')
+    assert code == 1 and errors == f'lift: {sentences.jog_no_longer("armed")}\n'
+    assert speeds(one) == [0.0]
+
+
 def test_never_the_value_again_after_a_standstill(bridge: StartBridge, run: Run,
                                                   monkeypatch: pytest.MonkeyPatch) -> None:
     one = enabled(bridge, run)
