@@ -100,6 +100,12 @@ def test_one_that_hangs_is_named_first_and_the_others_are_stopped(
     assert states(one, 'lift') == ['disabled']
 
 
+def test_where_online_is_called_otherwise_diagnostics_say_it(
+        bridge: StartBridge, run: Run) -> None:
+    bridge(parameters(lift=LIFT), arguments=('-r', 'lift:~/online:=/belt/on')).online()
+    assert run('stop') == (0, ['lift: ready'], '')
+
+
 def test_a_name_that_is_none_keeps_nobody_from_being_stopped(
         bridge: StartBridge, client: Client, run: Run) -> None:
     one = bridge(parameters(lift=LIFT)).online()

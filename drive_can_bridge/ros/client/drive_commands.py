@@ -11,12 +11,14 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
+from rclpy.qos import QoSProfile
 from rclpy.type_support import check_is_valid_srv_type
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.core import command_sentences, host_sentences
 from drive_can_bridge.core.bridges import is_some
+from drive_can_bridge.core.events import DriveState
 from drive_can_bridge.process.local_stop import (
     Answer, does_not_answer, may_match, stop_answer, STOP_TIMEOUT, twins)
 from drive_can_bridge.process.local_way import meant
@@ -33,8 +35,10 @@ from drive_can_bridge.ros.recognition import drives_among, namespace_of
 
 #: s after which a stop is repeated: DDS may lose an answer
 STOP_AGAIN = 1.0
-#: s that it may take to learn whether a drive is online
-_ONLINE_TIMEOUT = 5.0
+#: s that it may take to learn whether a drive is online: from its own topic, and at all
+_LATCHED_TIMEOUT, _ONLINE_TIMEOUT = 1.0, 5.0
+#: states of diagnostics in which it is not
+_NOT_ONLINE = (DriveState.OFFLINE.value, DriveState.MAPPING_DIFFERS.value)
 
 
 class _Stopping:
@@ -47,7 +51,7 @@ class _Stopping:
         self._said: Any = None
         self._since = now
         self._online: bool | None = None
-        self._inbox: Inbox | None = None
+        self._inboxes: list[Inbox] = []
         self._service = Service(client_node, Trigger, f'{node}/quick_stop', STOP_TIMEOUT,
                                 STOP_AGAIN)
         self._service.send(Trigger.Request(), self._take, now, 2.0 * OFFER_TIMEOUT,
@@ -71,18 +75,24 @@ class _Stopping:
     def look(self, now: float) -> None:
         """Handle what has arrived."""
         self._service.look(now)
-        if self._inbox is None:
+        if not self._inboxes:
             if not self._service.unsent:    # first things first
-                self._inbox = Inbox(self._client_node, Bool, f'{self.node}/online',
-                                    latched_quality(), self._take_online)
+                self._inboxes.append(Inbox(self._client_node, Bool, f'{self.node}/online',
+                                           latched_quality(), self._take_online))
             return
-        self._inbox.look()
+        for inbox in self._inboxes:
+            inbox.look()
         if self._said is None:
             self._since = now
         elif self.answer is None:
             said = self._said.message
             if self._online is not None:
                 self.answer = stop_answer(self.node, True, said, self._online)
+            elif len(self._inboxes) == 1 and now - self._since > _LATCHED_TIMEOUT:
+                # it is called otherwise (remapped)
+                from diagnostic_msgs.msg import DiagnosticArray
+                self._inboxes.append(Inbox(self._client_node, DiagnosticArray, '/diagnostics',
+                                           QoSProfile(depth=50), self._take_diagnostics))
             elif now - self._since > _ONLINE_TIMEOUT:
                 self.answer = Answer(self.node, False, command_sentences.online_unknown(
                     said=said or 'stopped'))
@@ -90,11 +100,18 @@ class _Stopping:
     def _take_online(self, message: Bool) -> None:
         self._online = message.data
 
+    def _take_diagnostics(self, message: Any) -> None:
+        for status in message.status:
+            bridge, _, name = status.name.partition(': drive ')
+            if f'{namespace_of(f"/{bridge}")}/{name}' == self.node:
+                self._online = any(pair.key == 'state' and pair.value not in _NOT_ONLINE
+                                   for pair in status.values)
+
     def close(self) -> None:
-        """Drop its service and subscription."""
+        """Drop its service and subscriptions."""
         self._service.close()
-        if self._inbox is not None:
-            self._inbox.close()
+        for inbox in self._inboxes:
+            inbox.close()
 
 
 class StopRequests:
