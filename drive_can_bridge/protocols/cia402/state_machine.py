@@ -209,6 +209,8 @@ class DriveRules(TableRules):
                 ServoState.OPERATION_ENABLED, ServoState.QUICK_STOP_ACTIVE):
             return together((
                 sentences.word_sent_last(self._last), self.lacking, self._else_known.why))
+        if sending is ControlAction.QUICK_STOP and self.state is ServoState.OPERATION_ENABLED:
+            return NOTHING      # it does not obey, and is disabled
         return sentences.still_braking()
 
 

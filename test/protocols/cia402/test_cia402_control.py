@@ -192,6 +192,16 @@ class TestQuickStop:
         axis.live(0.4)
         assert axis.words() == ['0200', '0600']
 
+    def test_one_that_does_not_obey_it_is_disabled_and_not_said_to_brake(self) -> None:
+        axis = Axis(control_timeout=0.5).enabled()
+        control = axis.drive._control
+        axis.drive._control = (     # type: ignore[method-assign]
+            lambda word: control(0x0F if word == 0x02 else word))
+        (_, success, why), = axis.asks(QUICK_STOP, 0.6)
+        assert (success, why) == (False, says('stuck', remarks=[
+            says('word_not_followed', word=0x02), says('now_disable')]))
+        assert axis.words() == ['0200', '0700', '0600']
+
     @pytest.mark.parametrize('by_bit', [True, False])
     def test_one_that_holds(self, by_bit: bool) -> None:
         axis = Axis(objects={(0x605A, 0): b'\x06\0', (0x606C, 0): b'\x10\0\0\0'}).enabled()
