@@ -376,9 +376,6 @@ trace_written = Text(
 trace_without_frames = Text(
     'bus {bus}: not a single frame in the last {seconds:g} s',
     do='see whether the bus is up, and drives are on it')
-trace_too_soon = Text(
-    'one trace in {seconds:g} s at most; {other}',
-    do='wait, or use the one that it names')
 asammdf_missing = Text(
     '{path}: .mf4 needs the Python module asammdf (pip install asammdf)',
     do='install it')

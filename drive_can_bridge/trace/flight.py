@@ -7,8 +7,8 @@ left for the garbage collector, whose work would grow with what is kept. Blocks 
 never touched again, so that writing them to a file needs no copy and no lock.
 
 A thread waits for a second after the event, so that what followed is in the trace, too, and writes
-in small steps between which it gives way. A requested trace takes nothing from those
-of failures: one that comes soon after it is written when a trace of this bus may be again.
+in small steps between which it gives way. A requested trace is always written, and takes nothing
+from those of failures.
 """
 
 from collections import deque
@@ -122,7 +122,7 @@ class Ring:
 
 #: s after an event that belong into its trace
 AFTERMATH = 1.0
-#: least s between two traces of a bus
+#: least s between two traces of a bus that nobody has requested
 SPACING = 10.0
 #: traces of a run that are never replaced by later ones: how it all began
 FIRST_KEPT = 5
@@ -165,9 +165,7 @@ class _RecordedBus:
     ring: Ring
     folder: Path
     wanted: _Wanted | None = None
-    last: float = -SPACING
     failed: float = -SPACING    # the last that was not requested
-    last_path: str = ''
 
 
 class FlightRecorder:
@@ -189,7 +187,7 @@ class FlightRecorder:
         channels = labels(buses)
         self._buses = {
             bus.name: _RecordedBus(bus, channels[bus.name],
-                                   Ring(bus.trace_seconds + AFTERMATH + SPACING + _SLACK),
+                                   Ring(bus.trace_seconds + AFTERMATH + _SLACK),
                                    Path(bus.trace_directory).expanduser() if bus.trace_directory
                                    else default_folder)
             for bus in buses if bus.trace_seconds > 0.0}
@@ -228,37 +226,23 @@ class FlightRecorder:
             return
         with self._lock:
             now, wanted = self._clock.now(), found.wanted
-            if wanted is None:
-                if now - found.failed >= SPACING:
+            if wanted is None or wanted.rank == _ASKED:
+                if now - found.failed >= SPACING:   # it takes over one that is asked for
                     found.failed = now
-                    self._want(found, _Wanted(
-                        reason, rank, now, max(now, found.last + SPACING)))
+                    self._want(found, reason, rank, now)
             elif rank > wanted.rank:
-                if wanted.rank == _ASKED:   # from now on it is that of a failure
-                    found.failed = wanted.at = now
                 wanted.reason, wanted.rank = reason, rank
 
     def save(self, bus: str, reason: str, done: Done) -> None:
         """Write a requested trace; ``done`` is called with its path, or with why there is none."""
         found = self._buses[bus]
         with self._lock:
-            now = self._clock.now()
-            wanted = found.wanted
-            if wanted is not None and wanted.at <= now:
-                wanted.done.append(done)
+            if found.wanted is None and not self._closing:  # else the thread may have ended
+                self._want(found, reason, _ASKED, self._clock.now())
+            if found.wanted is not None:
+                found.wanted.done.append(done)
                 return
-            if self._closing:   # the thread may have ended
-                refusal = command_sentences.recording_ended()
-            elif wanted is None and now - found.last >= SPACING:
-                self._want(found, _Wanted(reason, _ASKED, now, now, [done]))
-                return
-            else:
-                other = (f'the last, {now - found.last:.0f} s ago, is '
-                         f'{found.last_path or "not written"}' if wanted is None else
-                         f'that of {wanted.reason} follows in '
-                         f'{wanted.at - now + AFTERMATH:.0f} s')
-                refusal = command_sentences.trace_too_soon(seconds=SPACING, other=other)
-        done('', f'bus {bus}: {refusal}')
+        done('', f'bus {bus}: {command_sentences.recording_ended()}')
 
     def close(self) -> None:
         """Write what is still wanted, and end the thread."""
@@ -267,9 +251,10 @@ class FlightRecorder:
         self._changed.ring()
         self._thread.join(_END_TIMEOUT)
 
-    def _want(self, bus: _RecordedBus, wanted: _Wanted) -> None:
-        bus.wanted = wanted
-        bus.last = wanted.at
+    def _want(self, bus: _RecordedBus, reason: str, rank: int, now: float) -> None:
+        before = bus.wanted
+        bus.wanted = _Wanted(reason, rank, now, now) if before is None else _Wanted(
+            reason, rank, before.since, now, before.done)
         self._changed.ring()
 
     # -- the thread -------------------------------------------------------------------------------
@@ -323,13 +308,13 @@ class FlightRecorder:
             text += f'{type(error).__name__} {error}: {path}'
         else:
             if count:
-                answer = bus.last_path = str(path)
+                answer = str(path)
                 tell = self._say
                 text = (command_sentences.trace_written(
                     bus=name, reason=wanted.reason, count=count,
                     seconds=bus.configuration.trace_seconds, path=path))
             else:
-                bus.last = bus.failed = -SPACING
+                bus.failed = -SPACING
                 tell = None
                 text = (command_sentences.trace_without_frames(
                     bus=name, seconds=bus.configuration.trace_seconds))

@@ -82,8 +82,6 @@ def test_a_frame_leaves_nothing_behind() -> None:
 #: what is said of traces
 TOLD = {
     'trace': 'bus main: trace of conveyor offline, 2 frames of the last 10 s: {}',
-    'last': 'bus main: one trace in 10 s at most; the last, 1 s ago, is {}',
-    'next': 'bus main: one trace in 10 s at most; that of lift fault follows in 10 s',
     'end': 'bus main: the recording has ended',
     'silence': 'bus main: not a single frame in the last 10 s',
     'no place': 'bus main: no trace of asked: Not a directory: ',
@@ -144,26 +142,30 @@ def test_a_trace_has_what_came_before_and_after(bench: World, tmp_path: Path) ->
         assert made.said == [TOLD['trace'].format(path)]
 
 
-def test_one_trace_in_ten_seconds(bench: World, tmp_path: Path) -> None:
+def test_one_trace_in_ten_seconds_but_for_those_that_are_asked_for(
+        bench: World, tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         made.hear()
         made.recorder.trigger('main', 'lift fault')
         wait_for(lambda: made.said, 'a trace')
         made.recorder.trigger('main', 'again')
-        path, refusal = made.save()
-        assert not path and refusal.endswith(f', is {made.traces[0]}')
-        assert len(made.traces) == 1
+        saved = [made.save() for _ in range(2)]
+        assert saved == [(str(path), '') for path in made.traces[1:]]
+        assert [path.name.partition('Z_')[2] for path in made.traces] == [
+            'lift_fault.log', 'asked.log', 'asked.log']
 
 
-def test_one_trace_in_ten_seconds_for_whoever_asks(bench: World, tmp_path: Path) -> None:
+def test_a_failure_does_not_take_over_within_ten_seconds_of_another(
+        bench: World, tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         made.hear()
-        path, refusal = made.save()
-        assert path == str(made.traces[0]) and not refusal
-        path, refusal = made.save()
-        assert not path
-        assert refusal == TOLD['last'].format(made.traces[0])
-        assert len(made.traces) == 1
+        made.recorder.trigger('main', 'lift fault')
+        wait_for(lambda: made.said, 'a trace')
+        answers: list[str] = []
+        made.recorder.save('main', 'asked', lambda path, _: answers.append(path))
+        made.recorder.trigger('main', 'again', rank=3)
+        wait_for(lambda: answers, 'an answer')
+        assert answers[0].endswith('_asked.log')
 
 
 def test_a_failure_has_its_trace_whoever_has_asked_for_one(
@@ -174,14 +176,11 @@ def test_a_failure_has_its_trace_whoever_has_asked_for_one(
         assert made.save()[0]
         made.hear('222#')
         made.recorder.trigger('main', 'lift fault')
-        path, refusal = made.save()
-        assert not path and refusal.startswith(TOLD['next'])
-        assert len(made.traces) == 1, 'one in so many s'
-        wait_for(lambda: len(made.traces) == 2, 'the trace of the failure')
-        assert clock().now() > asked + flight.SPACING
-        assert made.traces[1].name.endswith('_lift_fault.log')
+        path, _ = made.save()       # the same one
+        assert clock().now() < asked + flight.SPACING
+        assert path.endswith('_lift_fault.log') and made.traces[1:] == [Path(path)]
         assert [record.identifier for record in read_records(made.traces[1], pytest.fail)] == [
-            0x222], 'what came before the failure, however late it is written'
+            0x222], 'what came before the failure'
 
 
 def test_a_failure_takes_over_a_trace_that_is_asked_for(bench: World, tmp_path: Path) -> None:
@@ -256,7 +255,6 @@ def test_who_asks_for_a_trace_at_the_end_is_answered(bench: World, tmp_path: Pat
 
 def test_first_and_newest_are_kept(bench: World, monkeypatch: pytest.MonkeyPatch,
                                    tmp_path: Path) -> None:
-    monkeypatch.setattr(flight, 'SPACING', 0.0)
     numbers = iter(range(100))
     monkeypatch.setattr(flight.time, 'strftime',
                         lambda *_: f'20260101T0000{next(numbers):02d}Z')
@@ -308,7 +306,6 @@ def test_whatever_fails_who_asks_is_answered(
         assert not path and made.complained == [refusal]
         assert refusal.startswith(TOLD['defect'])
         assert not list(tmp_path.iterdir())
-        pause(flight.SPACING)
         made.hear()
         path, refusal = made.save()     # by the same thread
         assert made.traces == [Path(path)] and not refusal
