@@ -433,6 +433,9 @@ sync_not_begun = Text(
     'SYNC begins when every drive of the bus that hears it is known not to be enabled, was told '
     'to stop, or is silent',
     do='wait a moment; see what the other drives of the bus say')
+sync_may_start = Text(
+    '{refusal}: a SYNC may start what an RPDO from before has left in the drive',
+    do='keep away from the motor; switch the drive off and on')
 sync_watched = Text(
     'the drive watches SYNC (1006h = {period} us): one cycle that is late by {late:.4g} s is a '
     'fault for it',

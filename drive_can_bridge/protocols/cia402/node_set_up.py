@@ -189,13 +189,31 @@ class NodeSetUp:
             yield Transfer(pause=POLL_PERIOD)
             reply = yield from self._transfer(Transfer(states.STATUS_WORD))
         self._found = NOTHING
-        if state in states.ONE_WORD_FROM_ENABLED and self._producer is not None:
-            # a SYNC may put into effect a 000Fh that the drive still has in its buffers
-            yield from self._put(states.CONTROL_WORD, 0, states.DISABLE_VOLTAGE, 2)
-        self.moving, self._disabled = None, True
+        self.moving = None
+        self._disabled = state not in states.ONE_WORD_FROM_ENABLED or (
+            yield from self._power_off())
         self._rules.known_disabled()
-        self._session.duty.happened(Happened.STOPPED)
+        if self._disabled:
+            self._session.duty.happened(Happened.STOPPED)
         return raw
+
+    def _power_off(self) -> Procedure[bool]:
+        """
+        Write 0000h: a SYNC may put into effect a 000Fh that the drive still has in its buffers.
+
+        :return: it was taken, or is not needed; False: the drive has refused it for 0.5 s.
+        """
+        producer = self._producer
+        if producer is None:
+            return True
+        self._stopped_at = min(self._stopped_at, self._channel.now)
+        while refusal := (yield from self._put(
+                states.CONTROL_WORD, 0, states.DISABLE_VOLTAGE, 2)):
+            if producer.opened or self._channel.now >= self._stopped_at + STOP_TIME:
+                self.report_once(sentences.sync_may_start(refusal))
+                return False
+            yield Transfer(pause=POLL_PERIOD)
+        return True
 
     def _stop_blindly(self, attempts: int | None = None) -> Procedure[None]:
         """Stop a drive whose state is unknown, before SYNC begins."""

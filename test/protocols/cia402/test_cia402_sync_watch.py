@@ -11,6 +11,7 @@ from stacks import BootsTwice, FewObjects, StartsItself, StartsSlowly, WatchesSy
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Noted, StationLost
+from drive_can_bridge.protocols.canopen.sdo import describe
 
 MUTE = {'heartbeat_producer': 0.0, 'heartbeat_timeout': 0.0}
 
@@ -176,11 +177,13 @@ class TestBeforeTheFirst:
         axis.deaf = axis.mute = True
         assert self.first(axis) == -1.0
 
-    @pytest.mark.parametrize('mapping', ['configure', 'verify', 'assume'])
-    @pytest.mark.parametrize('state', [
-        ServoDrive.ENABLED, ServoDrive.ON, ServoDrive.READY, ServoDrive.OFF])
-    def test_one_that_has_yet_to_obey_a_bridge_that_died(self, state: int, mapping: str) -> None:
-        """The RPDO came, and its SYNC did not: 000Fh, by which many go on from ready as well."""
+    @staticmethod
+    def died(state: int, mapping: str) -> tuple[Axis, list[int]]:
+        """
+        Return an axis, and the states that its drive takes.
+
+        The RPDO came, and its SYNC did not: 000Fh, by which many go on from ready as well.
+        """
         before = Axis('pv').enabled().commands(0.0, 100.0)
         before.live(0.05)
         drive = before.drive
@@ -188,16 +191,42 @@ class TestBeforeTheFirst:
         drive.becomes(state)
         after = Axis('pv', mapping=mapping)
         after.drive = drive
-        became = []
+        became: list[int] = []
         becomes = drive.becomes
 
         def records(to: int) -> None:
             became.append(to)
             becomes(to)
         drive.becomes = records     # type: ignore[method-assign]
+        return after, became
+
+    @pytest.mark.parametrize('mapping', ['configure', 'verify', 'assume'])
+    @pytest.mark.parametrize('state', [
+        ServoDrive.ENABLED, ServoDrive.ON, ServoDrive.READY, ServoDrive.OFF])
+    def test_one_that_has_yet_to_obey_a_bridge_that_died(self, state: int, mapping: str) -> None:
+        after, became = self.died(state, mapping)
         self.first(after)
         assert after.session.online
-        assert drive.ENABLED not in became
+        assert ServoDrive.ENABLED not in became
+
+    @pytest.mark.parametrize('answer', ['8040600022000008', '0000000000000000'])
+    @pytest.mark.parametrize('state', [ServoDrive.ON, ServoDrive.READY])
+    def test_and_does_not_take_its_power_off_yet(self, state: int, answer: str) -> None:
+        after, became = self.died(state, 'verify')
+        after.drive.instead = {'2b4060000000': answer}
+        assert self.first(after, 0.4) == -1.0
+        after.drive.instead = {}
+        after.live(2.0)
+        assert after.session.online
+        assert ServoDrive.ENABLED not in became
+        assert not [note for note in after.talk.events(Noted) if 'SYNC may start' in note.text]
+
+    def test_or_never(self) -> None:
+        after, _ = self.died(ServoDrive.READY, 'verify')
+        after.drive.fixed = {(0x6040, 0): 0x08000022}
+        assert self.first(after) == pytest.approx(0.5, abs=0.03)
+        assert after.talk.events(Noted)[0].text == says('sync_may_start', refusal=says(
+            'object_refused', what='6040h.00h', why=describe(0x08000022)))
 
     @pytest.mark.parametrize('instead', [{'404160': '8041600022000008'}, {}])
     def test_one_that_beats_and_does_not_say_it(self, instead: dict[str, str]) -> None:
