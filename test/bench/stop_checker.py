@@ -47,7 +47,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.families import make_sessions
 
 #: s until a frame is answered, and by a drive that is late
-PROMPT, LATE, SLOW = 0.002, 1.4 * PERIOD, 0.27
+PROMPT, LATE, LATER, SLOW, SLOWER = 0.002, 1.4 * PERIOD, 0.16, 0.27, 0.4
 #: s that a drive is talked to until it has to stand
 STOPPED_AFTER = 3.0
 #: stories that are told of each kind before the next has its turn
@@ -64,7 +64,7 @@ RAW, VALUE, COMMANDED_EVERY = 50, 5.0, 0.1
 THINGS = ('run', 'enable', 'zero', 'quiet', 'disable', 'quick_stop', 'silent', 'mute', 'late',
           'twice', 'well', 'power', 'stall', 'late process', 'bus down', 'bus up', 'refuses',
           'maps', 'response map', 'maps right', 'nmt stop', 'end', 'begin', 'slow', 'lossy',
-          'cycles lost', 'requests lost', 'trips', 'reset', 'nmt start')
+          'cycles lost', 'requests lost', 'trips', 'reset', 'nmt start', 'later', 'slower')
 PAUSES = (0.013, 0.9)
 Story = tuple[tuple[str, float], ...]
 
@@ -385,10 +385,20 @@ class World:
 
     def _twice(self) -> None:
         # answers that say nothing cannot be told apart where late ones never end
-        self.twice = self.delay != SLOW or not isinstance(self.partners[0].device, StandardDrive)
+        self.twice = self.delay in (PROMPT, LATE) or not isinstance(
+            self.partners[0].device, StandardDrive)
+
+    def _later(self) -> None:
+        self.delays(LATER)
 
     def _slow(self) -> None:
-        self.delay = SLOW
+        self.delays(SLOW)
+
+    def _slower(self) -> None:
+        self.delays(SLOWER)
+
+    def delays(self, seconds: float) -> None:
+        self.delay = seconds
         if isinstance(self.partners[0].device, StandardDrive):
             self.twice = False      # as above
 

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Stories of drives that run, judged from their motors; and some that show a broken stop."""
 
-from itertools import islice
+from itertools import islice, product
 from typing import Any
 
 from extent import some, times
@@ -26,8 +26,8 @@ BY_CHANCE = times(3, 20)
 @pytest.mark.parametrize('kind', KINDS)
 def test_no_motor_runs_on(kind: str) -> None:
     everything = [*all_stories(1)]
-    assert len(everything) == 60
-    assert check(kind, some(everything, 6)) >= times(7, 60)
+    assert len(everything) == 64
+    assert check(kind, some(everything, 6)) >= times(7, 64)
     assert check(kind, islice(some_stories(1), BY_CHANCE)) == BY_CHANCE
 
 
@@ -92,6 +92,16 @@ def test_a_drive_that_answers_cycles_and_does_not_obey_its_word_is_named(
     for later in [(), (('silent', 0.9),), (('mute', 0.9),), (('cycles lost', 0.9),),
                   (('refuses', 0.9),)]:     # also if it is lost meanwhile
         assert not broken(kind, (('requests lost', 0.0), (before, 0.9), *later, (end, 0.013)))
+
+
+@pytest.mark.parametrize('kind', [kind for kind in KINDS if '29 bit' in kind or 'CANnord' in kind])
+def test_answers_that_come_late_of_a_sudden_are_none_to_a_stop(kind: str) -> None:
+    """The drive is deaf from the stop on: what it answers is to the cycles before."""
+    whens = some((0.02, 0.05, 0.08, 0.12, 0.2, 0.31), 4)
+    for late, seconds in [('later', 0.02), ('slow', 0.12), *product(
+            ('later', 'slow', 'slower'), whens)]:
+        for stop in (), (('quick_stop', 0.05),), (('zero', 0.3),):
+            assert not broken(kind, ((late, seconds), ('silent', 0.0), *stop, ('end', 0.0)))
 
 
 def _nothing(*_: Any, **__: Any) -> None:

@@ -393,8 +393,8 @@ class ExtendedSession(Session):
                     self.restart(now)
                 return
             self.be_online()
-            # a neutral cycle, right after a look at its maps; what was written it may have missed
-            self.duty.channel(CYCLE, Happened.ANSWERED)
+            if self._verify:    # a neutral cycle, right after a look at its maps; what was
+                self.duty.channel(CYCLE, Happened.ANSWERED)     # written it may have missed
             self._side.found(now)
         slot = self._side.status_slot
         # by number, a word may have left since this was asked for

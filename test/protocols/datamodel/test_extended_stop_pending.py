@@ -503,4 +503,7 @@ def test_silent_drive_with_assumed_maps_is_told_by_number_when_neutral_cycles_ar
     assert talk.session.duty.stop_pending
     talk.hears(ANSWER, 12.001)
     assert talk.session.online
+    for cycle in range(1, 4):   # three that ran it went unanswered: these may be the answers
+        assert talk.session.duty.stop_pending
+        talk.hears(ANSWER, talk.until(12.0 + 0.02 * cycle + 0.001)[-1][0] + 0.001)
     assert not talk.session.duty.stop_pending
