@@ -449,7 +449,7 @@ def _tell_left_out(args: Namespace, scan: BusScan, asked: Sequence[str]) -> None
     """Print the bit rate, and what was not asked, and how to ask it."""
     left = [name for name in FAMILIES if name not in asked]
     told = f'{args.bitrate} bit/s, ' if args.bitrate else ''
-    told += f'{scan.frames} frames heard'
+    told += f'{scan.frames} frame{"s" * (scan.frames != 1)} heard'
     if args.passive:
         told += '; nothing was asked: --passive'
     elif left and not scan.master and not scan.nodes and not scan.trouble:

@@ -99,9 +99,10 @@ def answers(local: LocalStop, ros: WithoutRos | None, namespace: str | None,
     known = {*local.known, *through.seen}
     nodes = {answer.name for answer in told if not answer.bridge}
     there = ', '.join(node.lstrip('/') for node in dict.fromkeys(
-        [*local.drives, *through.drives])) or 'none'
+        [*local.drives, *through.drives]))
+    # without any, bridges have none, or have not said which
     told += [Answer(word, False, host_texts.no_such_drive.format(there=there)) for word in words
-             if known and not any(matches(word, node) for node in nodes)]
+             if there and not any(matches(word, node) for node in nodes)]
     own = any(each.domain in (None, local.domain) for each in local.present)
     if not known and (not told or not own and ros is not None):
         from drive_can_bridge.process.environment import no_bridge     # takes its time

@@ -121,6 +121,17 @@ def test_a_name_that_is_none_keeps_nobody_from_being_stopped(
         liar.withdraw()
 
 
+def test_nobody_knows_which_drives_there_are_where_no_bridge_answers(
+        client: Client, run: Run) -> None:
+    hung = Presence(client.node.context.get_domain_id(), '/a/bridge')
+    try:
+        code, lines, _ = run('stop', 'lift')
+        assert code == 1 and len(lines) == 1
+        assert lines[0].startswith('a/bridge: NOT STOPPED: this bridge of this host ')
+    finally:
+        hung.withdraw()
+
+
 def test_one_that_another_one_sees_is_named(
         client: Client, run: Run) -> None:
     answer(client, '/a/bridge', others=['/b/bridge'], drives='')()
