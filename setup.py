@@ -32,6 +32,7 @@ BUILDER = 'mypy==2.4.1'
 BY_PIP = 'setuptools.build_meta' in sys.modules
 #: what each frame or cycle runs through; the rest is not worth it, and stays Python
 COMPILED = {
+    'core/command_age': 'each look at the commands that wait',
     'core/command_interlock': 'each cycle and sample: whether commands reach the drive',
     'core/control_machine': 'each cycle: the control word; each status word',
     'core/drive_services': 'each command and request',
@@ -48,6 +49,7 @@ COMPILED = {
     'core/stop_duty': 'each frame that is sent, each answer',
     'exchange/exchange': 'the threads of a bus: each frame, each pass',
     'exchange/member': 'each frame and each timer: sending and telling',
+    'protocols/acyclic_output': 'each answer to a cycle: whether a word has its setpoints',
     'protocols/answers': 'each answer to a cycle',
     'protocols/channel': 'each pass: whether a request is due',
     'protocols/cyclic_exchange': 'each cycle',
@@ -64,6 +66,7 @@ COMPILED = {
     'transport/end_point': 'what a port is made of',
     'transport/link': 'each frame that is received or sent',
     'transport/port': 'likewise',
+    'transport/raw_socket': 'each frame of SocketCAN',
 }
 
 

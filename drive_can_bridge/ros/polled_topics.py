@@ -237,9 +237,12 @@ class PolledTopics:
 
     def take(self, now: float) -> None:
         """Deliver all waiting messages, oldest first."""
+        counting = now >= self._count_at
+        if not counting and not self._published:
+            return
         look = self._look()
         try:
-            if now < self._count_at:
+            if not counting:
                 for topic in self._published:
                     topic.take(now, look)
                 return
