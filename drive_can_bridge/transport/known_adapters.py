@@ -224,7 +224,7 @@ ROWS: tuple[Row, ...] = (
         'by the source of python-can-wuensche 1.0.0', module='python-can-wuensche'),
     Row('remote', "python-can's interfaces of another computer (plug-in python-can-remote)",
         'remote', 'ws://10.0.0.5:54701/',
-        'stamps of the other computer; where that hangs, the end of the bridge waits 5 s for it',
+        'stamps of the other computer; where that hangs, the end of the bridge waits 2 s for it',
         '`socketcand`, where the other computer has SocketCAN',
         'its server 0.3.0, with a simulated servo', module='python-can-remote'),
     Row('cannelloni', 'cannelloni over TCP (plug-in can-cannelloni)', 'cannelloni',

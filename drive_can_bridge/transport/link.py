@@ -46,6 +46,8 @@ BLOCKED_AFTER = 0.05
 _GOING, _MOMENT = 10, 0.01
 #: s after which an attempt to open that has not returned is reported
 OPEN_TIMEOUT = 2.0
+#: s that an adapter may take to close, when all has been sent
+CLOSE_TIMEOUT = 2.0
 
 
 class LinkListener(Protocol):
@@ -188,7 +190,7 @@ class Link:
         attempt = self._attempt
         if attempt is not None:
             attempt.ended.ring()
-        self._reader_thread.join(5.0)
+        self._reader_thread.join(CLOSE_TIMEOUT)
 
     def send(self, frame: Frame) -> bool:
         """

@@ -22,7 +22,7 @@ from drive_can_bridge.transport import link as link_module
 from drive_can_bridge.transport.end_point import Counts, EndPoint
 from drive_can_bridge.transport.error_frames import BusError
 from drive_can_bridge.transport.kernel_interfaces import KernelInterface
-from drive_can_bridge.transport.link import Link, RECEIVE_TIMEOUT
+from drive_can_bridge.transport.link import CLOSE_TIMEOUT, Link, RECEIVE_TIMEOUT
 from drive_can_bridge.transport.port import open_port
 
 FRAME = Frame(0x003FFFF0, bytes(8), True)
@@ -310,6 +310,19 @@ def test_frame_that_is_there_before_the_bus_counts_as_open_is_older_than_what_is
     make(ReadyPort)
     wait_for(lambda: heard)
     assert heard == [(ANSWER, pytest.approx(0.03))]
+
+
+def test_an_adapter_that_hangs_at_the_end_is_not_waited_for_long(
+        make: Callable[..., Bench]) -> None:
+    class HangingPort(FakePort):
+        def close(self) -> None:
+            pause(10.0)
+            super().close()
+    bench = make(HangingPort)
+    began = bench.clock.now()
+    bench.link.stop()
+    assert bench.clock.now() <= began + CLOSE_TIMEOUT + 0.1 and not bench.port.closed
+    wait_for(lambda: not bench.clock.tasks)
 
 
 def test_loss_seen_by_a_sender(make: Callable[..., Bench]) -> None:
