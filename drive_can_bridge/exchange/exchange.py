@@ -111,8 +111,8 @@ class Router(Generic[Owner]):
         return table
 
 
-def together(bitrate: int, *, extended: bool) -> int:
-    """Return how many exchanges the wire carries in a slot: so many drives may share a turn."""
+def exchanges_in_slot(bitrate: int, *, extended: bool) -> int:
+    """Return how many exchanges the wire carries in a ``SLOT``, one at least."""
     return max(1, int(SLOT * bitrate / bits_of_exchange(extended=extended)))
 
 
@@ -229,7 +229,7 @@ class BusExchange:
         self.link = Link(bus, filters, self, clock, send_timeout=send_timeout,
                          stations=len(self._sessions), prepare_thread=prepare_thread,
                          opener=open_bus and (lambda: open_bus(bus)), keep_time=self._keep_time)
-        sharing = together(bus.bitrate, extended=any(route.extended for route in filters))
+        sharing = exchanges_in_slot(bus.bitrate, extended=any(route.extended for route in filters))
         for session, phase in zip(sessions, stagger(periods, sharing)):
             session.phase = phase
         self.periodic_task: PeriodicTask | None = None

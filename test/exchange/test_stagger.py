@@ -5,7 +5,7 @@ from builders import drive
 from exchange_builders import Bench
 import pytest
 
-from drive_can_bridge.exchange.exchange import stagger, together
+from drive_can_bridge.exchange.exchange import exchanges_in_slot, stagger
 
 
 def test_one_drive_has_the_bus_for_itself() -> None:
@@ -29,7 +29,7 @@ def test_no_finer_than_a_slot() -> None:
 def test_a_turn_is_what_the_wire_carries_in_a_slot(
         bitrate: int, extended: bool, sharing: int) -> None:
     # 290 bits an exchange with 29 bits of identifier, 246 with 11, in 1.5 ms
-    assert together(bitrate, extended=extended) == sharing
+    assert exchanges_in_slot(bitrate, extended=extended) == sharing
 
 
 def test_no_finer_than_the_wire_needs() -> None:
