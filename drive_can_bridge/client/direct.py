@@ -96,11 +96,13 @@ class BusConversation:
 
         :raises DriveCanError: another master talks to a drive, or the bus is lost.
         """
-        end = self.now() + seconds
         self._check()
-        while self.now() < end:
-            self._changed.wait(min(end, self.now() + _PATIENCE))
+        end = self.now() + seconds
+        while (began := self.now()) < end:
+            self._changed.wait(min(end, began + _PATIENCE))
             self._check()
+            # a process that did not run meanwhile has not listened for longer
+            end += max(self.now() - began - _PATIENCE, 0.0)
 
     def submit(self, drive: str, request: Request) -> None:
         """

@@ -6,6 +6,7 @@ import copy
 import gc
 from pathlib import Path
 import re
+from types import SimpleNamespace
 from typing import Any
 import weakref
 
@@ -16,7 +17,7 @@ from saying import says
 from waiting import wait_for
 
 from drive_can_bridge.client import find_source, open_drives
-from drive_can_bridge.client.direct import LISTEN
+from drive_can_bridge.client.direct import BusConversation, LISTEN
 from drive_can_bridge.client.drive import Drives, Enabled
 from drive_can_bridge.core.errors import BusUnavailable, DriveCanError
 from drive_can_bridge.core.roles import Role
@@ -50,6 +51,21 @@ def drives(world: World) -> Iterator[Drives]:
     """Return the drives of all families, their node started."""
     with open_drives(world.file, nmt_start=True) as opened:
         yield opened
+
+
+def test_who_did_not_run_for_a_while_has_not_listened() -> None:
+    conversation = BusConversation.__new__(BusConversation)
+    now, waits = [0.0], []
+
+    def wait(until: float) -> None:
+        waits.append(until)
+        now[0] = until + 60.0 * (len(waits) == 1)
+        conversation._trouble = AnotherMaster('heard') if len(waits) == 5 else None
+
+    conversation.now, conversation._trouble = (lambda: now[0]), None
+    conversation._changed = SimpleNamespace(wait=wait)      # type: ignore[assignment]
+    with pytest.raises(AnotherMaster):
+        conversation.listen(LISTEN)
 
 
 def reasons(outcomes: dict[str, Any]) -> dict[str, str]:
