@@ -22,7 +22,7 @@ from types import ModuleType
 from typing import Any
 
 from drive_can_bridge.core import command_sentences
-from drive_can_bridge.core.parameters import ParameterType
+from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.text import counted
 from drive_can_bridge.profiles.catalogue import (
     check, Checked, Draft, FileContent, ImportFailed, LeftOut)
@@ -684,7 +684,12 @@ def _standardise(found: FileContent, sections: Mapping[str, EdsSection], shift: 
              for name, entry in shipped.entries.items()}
     found.drafts = [draft for draft in found.drafts if draft.entry['index'] not in _BUILT_IN]
     for draft in found.drafts:
-        draft.name = known.get((draft.entry['index'], draft.entry['subindex']), '')
+        entry = draft.entry
+        draft.name = known.get((entry['index'], entry['subindex']), '')
+        # what moves an axis that the bridge does not enable is no setting
+        if entry['access'] != 'ro' and (shift or not draft.name) and _BY_OBJECTS[0].is_command(
+                Parameter('', index=entry['index'])):
+            entry['protected'] = True
     names = {draft.name for draft in found.drafts}
     raw = [draft for draft in found.drafts
            if not _complete(draft, shipped, units, names, turning)]

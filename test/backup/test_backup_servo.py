@@ -34,14 +34,16 @@ FILE = f"""/**/drive_can_bridge:
         cyclic_request: [target_velocity]
         cyclic_response: [actual_velocity]
 """
-#: setpoints and offsets of all modes, the mode, the control word
+#: setpoints and offsets of all modes, the mode, the control word, of all axes
 COMMANDS = {
     'target_position': (0x607A, 0, 'int32'), 'target_velocity': (0x60FF, 0, 'int32'),
     'target_torque': (0x6071, 0, 'int16'), 'vl_target': (0x6042, 0, 'int16'),
     'interpolation': (0x60C1, 1, 'int32'), 'interpolation_2': (0x60C1, 2, 'int32'),
     'position_offset': (0x60B0, 0, 'int32'), 'velocity_offset': (0x60B1, 0, 'int32'),
     'torque_offset': (0x60B2, 0, 'int16'), 'mode': (0x6060, 0, 'int8'),
-    'control': (0x6040, 0, 'uint16')}
+    'control': (0x6040, 0, 'uint16'), 'left_wheel': (0x60FF, 1, 'int32'),
+    'control_2': (0x6840, 0, 'uint16'), 'mode_3': (0x7060, 0, 'int8'),
+    'target_8': (0x98FF, 0, 'int32')}
 SETTINGS = {
     'acceleration': (0x6083, 0, 'uint32'), 'deceleration': (0x6084, 0, 'uint32'),
     'max_torque': (0x6072, 0, 'uint16'), 'window': (0x6067, 0, 'uint32'),

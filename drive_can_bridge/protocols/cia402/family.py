@@ -30,8 +30,9 @@ JITTERS_BELOW = 0.005
 #: s: longest event timer, and longest time of a heartbeat consumer (16 bits of ms)
 TIMER_MAX = 65.535
 _SETPOINTS = {(mode.index, mode.subindex) for mode in MODES.values()}
-#: control word, mode, setpoints of all modes, offsets of setpoints (60B0h to 60B2h)
-_COMMANDS = {CONTROL_WORD, MODE, 0x60B0, 0x60B1, 0x60B2, *(index for index, _ in _SETPOINTS)}
+#: control word, mode, setpoints of all modes, offsets of setpoints (60B0h to 60B2h), of all axes
+_COMMANDS = {index + 0x800 * axis for axis in range(8) for index in (
+    CONTROL_WORD, MODE, 0x60B0, 0x60B1, 0x60B2, *(index for index, _ in _SETPOINTS))}
 _LISTS = (('request_pdos', 'cyclic_request', CONTROL_PARAMETER),
           ('response_pdos', 'cyclic_response', STATUS_PARAMETER))
 _HEARTBEAT = worst_bits(1, extended=False)
