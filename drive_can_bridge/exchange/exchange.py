@@ -36,6 +36,7 @@ from drive_can_bridge.core.frame import bits_of_exchange, bits_on_bus, Frame, Ro
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.member import BusListener, DriveListener, Member, STOP_MARGIN
+from drive_can_bridge.transport.bus_identity import SERIAL_INTERFACES
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.link import Link
 
@@ -111,9 +112,11 @@ class Router(Generic[Owner]):
         return table
 
 
-def exchanges_in_slot(bitrate: int, *, extended: bool) -> int:
+def exchanges_in_slot(bus: BusConfiguration, *, extended: bool) -> int:
     """Return how many exchanges the wire carries in a ``SLOT``, one at least."""
-    return max(1, int(SLOT * bitrate / bits_of_exchange(extended=extended)))
+    if bus.interface in SERIAL_INTERFACES:  # whose own line is the slower one
+        return 1
+    return max(1, int(SLOT * bus.bitrate / bits_of_exchange(extended=extended)))
 
 
 def stagger(periods: Sequence[float], sharing: int = 1) -> list[float]:
@@ -229,7 +232,7 @@ class BusExchange:
         self.link = Link(bus, filters, self, clock, send_timeout=send_timeout,
                          stations=len(self._sessions), prepare_thread=prepare_thread,
                          opener=open_bus and (lambda: open_bus(bus)), keep_time=self._keep_time)
-        sharing = exchanges_in_slot(bus.bitrate, extended=any(route.extended for route in filters))
+        sharing = exchanges_in_slot(bus, extended=any(route.extended for route in filters))
         for session, phase in zip(sessions, stagger(periods, sharing)):
             session.phase = phase
         self.periodic_task: PeriodicTask | None = None

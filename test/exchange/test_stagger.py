@@ -5,6 +5,7 @@ from builders import drive
 from exchange_builders import Bench
 import pytest
 
+from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.exchange.exchange import exchanges_in_slot, stagger
 
 
@@ -29,7 +30,14 @@ def test_no_finer_than_a_slot() -> None:
 def test_a_turn_is_what_the_wire_carries_in_a_slot(
         bitrate: int, extended: bool, sharing: int) -> None:
     # 290 bits an exchange with 29 bits of identifier, 246 with 11, in 1.5 ms
-    assert exchanges_in_slot(bitrate, extended=extended) == sharing
+    bus = BusConfiguration('main', 'socketcan', 'can0', bitrate=bitrate)
+    assert exchanges_in_slot(bus, extended=extended) == sharing
+
+
+def test_behind_a_serial_line_each_drive_has_its_turn() -> None:
+    # a frame of 27 characters takes 2.3 ms at 115,200 baud, whatever the bus can do
+    bus = BusConfiguration('main', 'slcan', '/dev/ttyACM0', bitrate=1_000_000)
+    assert exchanges_in_slot(bus, extended=True) == 1
 
 
 def test_no_finer_than_the_wire_needs() -> None:
