@@ -216,6 +216,13 @@ class ControlMachine:
         return self.pending and not self.pulsing and not self.unseen
 
     @property
+    def confirmed_off(self) -> bool:
+        """Return whether the drive, knowing the current word, reports that it does not run."""
+        if self._table.enabled is None:
+            return self._sent
+        return self._reports.standing and not self._rules.may_run
+
+    @property
     def unseen(self) -> bool:
         """Whether the drive does not report whether it runs."""
         return self._table.enabled is None
@@ -432,7 +439,7 @@ class ControlMachine:
             case Seen.ENABLED:
                 return self._confirmed(table.enabled, True) and not self._rules.lacking
             case Seen.OFF:
-                return self._confirmed_off()
+                return self.confirmed_off
             case Seen.RESETTABLE:
                 return not under_way.pulsed and self._resettable()
             case Seen.PULSED:
@@ -516,17 +523,11 @@ class ControlMachine:
     def _may_run(self) -> bool:
         """Whether a stop has anything to do, as far as is known."""
         return (self._sending in (ControlAction.ENABLE, ControlAction.QUICK_STOP)
-                or not self._confirmed_off())
+                or not self.confirmed_off)
 
     def _confirmed(self, pattern: StatusPattern | None, wanted: bool) -> bool:
         """Return whether the drive, knowing the current word, reports a condition (or cannot)."""
         return self._sent if pattern is None else self._reports.confirmed(pattern, wanted)
-
-    def _confirmed_off(self) -> bool:
-        """Return whether the drive, knowing the current word, reports that it does not run."""
-        if self._table.enabled is None:
-            return self._sent
-        return self._reports.standing and not self._rules.may_run
 
     def _resettable(self) -> bool:
         """Return whether the drive, knowing ``disable``, reports a fault that can be reset."""

@@ -30,6 +30,7 @@ class CycleAnswers:
     :ivar timing: says what would have held.
     :ivar due: when the answer counts as missed; infinity: with the next cycle, or there is none.
     :ivar confirms: an answer to a cycle shows that what the drive was told by it has arrived.
+    :ivar by_number: it shows nothing of a control word, which only a status behind that does.
     """
 
     def __init__(self, session: Session, *, silence: str, advice: str = '',
@@ -38,7 +39,7 @@ class CycleAnswers:
         self.session = session
         self.timing = TimingAdvice(session.configuration, session.report, period_max)
         self.book = ExchangeBook(session.configuration, session.statistics, timer)
-        self.confirms = True
+        self.confirms, self.by_number = True, False
         self._silent = sentences.silent(silence, advice)
         self.in_turn = in_turn
         self.due = math.inf
@@ -110,14 +111,18 @@ class CycleAnswers:
 
     def _confirm_stop(self) -> None:
         """Record an answer that acknowledges what was commanded last, if it does."""
-        duty = self.session.duty
         if self.confirms and self.book.stop_shown:
-            if self.session.online:
-                duty.happened(Happened.ANSWERED)
-            else:       # what else it was told while it was silent, it may have missed
-                duty.channel(CYCLE, Happened.ANSWERED)
+            self.stop_answered()
         if self.book.stop_shown:
             self.session.neutral_stop.answered()
+
+    def stop_answered(self) -> None:
+        """Record that what cycles command was acknowledged, and what else was, if they show it."""
+        duty = self.session.duty
+        if self.session.online and not self.by_number:
+            duty.happened(Happened.ANSWERED)
+        else:       # what else it was told while it was silent, it may have missed
+            duty.channel(CYCLE, Happened.ANSWERED)
 
     def settle(self, now: float, *, early: bool = False) -> None:
         """

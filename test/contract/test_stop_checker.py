@@ -104,6 +104,16 @@ def test_answers_that_come_late_of_a_sudden_are_none_to_a_stop(kind: str) -> Non
             assert not broken(kind, ((late, seconds), ('silent', 0.0), *stop, ('end', 0.0)))
 
 
+@pytest.mark.parametrize('kind', [
+    kind for kind in KINDS if '29 bit' in kind or 'word by number' in kind])
+def test_an_answered_cycle_is_no_word_that_was_heard(kind: str) -> None:
+    """What is written by number is lost, and no status is there that could show it."""
+    for before, seconds, end in some(product(
+            ('disable', 'quick_stop', 'stall'), (0.01, 0.02, 0.05, 0.1), ('end', 'bus down')), 4):
+        assert not broken(kind, (
+            ('requests lost', 0.02), (before, seconds), (end, 0.0)))
+
+
 def _nothing(*_: Any, **__: Any) -> None:
     pass
 

@@ -99,6 +99,8 @@ class ExtendedSession(Session):
         self._answers: CycleAnswers = CycleAnswers(self, silence='no cyclic response')
         self._exchange = CyclicExchange(self._answers, self, slot=self._side.control_slot)
         self._answers.confirms = not self._verify      # otherwise the maps tell who has heard it
+        self._answers.by_number = (
+            control is not None and self._side.control_slot is None and not control.unseen)
         self._lifecycle = Lifecycle(self._channel)
         self.set_parts(self._exchange, self._lifecycle, *self._side.parts, channel=self._channel)
         self._differs = False       # what the last look at the maps found
@@ -111,7 +113,7 @@ class ExtendedSession(Session):
     def prepare_stop(self, now: float) -> bool:
         self._side.clear()
         self._lifecycle.stop()
-        self._judge_word()
+        self._judge_word(unseen=True)
         pending = self.duty.happened(Happened.ENDS) is Do.STOP
         return self._exchange.cycling or (self.stage is not Stage.IDLE and pending)
 
@@ -119,11 +121,21 @@ class ExtendedSession(Session):
         self._judge_word()
         super().lose(reason, now)
 
-    def _judge_word(self) -> None:
-        """Record a drive that answers cycles, as if it had heard its word, but runs on."""
-        if self.control is not None and self.control.unconfirmed and (
-                self._side.control_slot is None):
-            self.duty.channel(CONTROL_WORD, Happened.RUN_LEFT)
+    def bus_down(self, now: float, reason: str) -> None:
+        self._judge_word(unseen=True)
+        super().bus_down(now, reason)
+
+    def _judge_word(self, *, unseen: bool = False) -> None:
+        """
+        Record a drive that answers cycles, as if it had heard its word, but runs on.
+
+        :param unseen: or has not been seen to stand since that left.
+        """
+        if self.control is not None and self._answers.by_number:
+            if self.control.unconfirmed:
+                self.duty.channel(CONTROL_WORD, Happened.RUN_LEFT)
+            elif unseen and not self.control.confirmed_off:
+                self.duty.channel(CONTROL_WORD, Happened.MISROUTED)
 
     def begin_stop(self, now: float) -> bool:
         if self._exchange.cycling:
@@ -198,7 +210,7 @@ class ExtendedSession(Session):
                     # a look that was under way when the stop left shows nothing of it
                     if (self.online and self._answers.book.stop_shown
                             and transactor.asked_at > transactor.wrote_at):
-                        self.duty.happened(Happened.ANSWERED)
+                        self._answers.stop_answered()
                 elif exchange.leaving and self.setpoints.held:
                     pass    # a stop takes its course
                 elif (yield from self._find_axes(poll_at)):
@@ -353,9 +365,9 @@ class ExtendedSession(Session):
         if self._verify and not self.online:
             self.restart(now)
             return
-        self._judge_word()
-        do = self.duty.happened(Happened.LOST if self.online else Happened.UNANSWERED)
+        happened = Happened.LOST if self.online else Happened.UNANSWERED
         self.lose(reason, now)
+        do = self.duty.happened(happened)
         if do is not Do.NOTHING:    # setpoints that heard cycles go neutral with the next
             self._side.begin_stop(now, setpoints=do is Do.STOP_BY_NUMBER)
         if self.interlock.position_unknown:

@@ -83,6 +83,8 @@ class ControlByNumber:
         """Write the control word if it changed, or if the drive takes no notice of it."""
         control, output = self._control, self._output
         word, runs = control.word, not control.at_rest
+        if self._session.may_run and control.stopping and control.confirmed_off:
+            self._session.duty.channel(CONTROL_WORD, Happened.ANSWERED)
         if self._word is None or word == output.word and not output.word_due(now):
             return
         output.word_begun(word)

@@ -392,11 +392,11 @@ def test_look_at_the_maps_shows_nothing_of_a_word_that_was_written_behind_it() -
 
 
 def test_nor_does_it_when_a_cycle_behind_that_word_was_answered() -> None:
-    """Cycles are heard, and what is told by number is not any more."""
+    """Cycles are heard, and what is told by number is not any more: it reports enabled."""
     talk = enabled_at_a_look(online(control=CONTROL))
     assert talk.hears(REQUEST_MAP, 11.004) == [ASK_RESPONSE_MAP]
     assert talk.asks(ControlAction.DISABLE, 11.005) == [DISABLE]
-    assert exchange(talk, 11.02) == NEUTRAL
+    assert exchange(talk, 11.02, ENABLED) == NEUTRAL
     talk.hears(RESPONSE_MAP, 11.023)
     talk.until(13.0)
     assert warnings(talk) == [
