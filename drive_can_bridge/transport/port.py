@@ -51,8 +51,9 @@ _EARLY_MAX, _EARLY_TIME = 1000, 0.1
 _EARLY_LOOK = 100
 # So many frames may be confirmed at once: what a terminal keeps.
 _UNCONFIRMED_MAX = 4096
-# s for a serial adapter's answers to the commands that opened it, and s for one look.
-_ANSWER_TIME, _ANSWER_LOOK = 0.16, 0.02
+# s of silence until a serial adapter answers none of the commands that opened it, or no more; and
+# until it answers no more although it has begun to; s for one look.
+_SILENCE, _LONG_SILENCE, _ANSWER_LOOK = 0.16, 0.5, 0.02
 # Data bytes of a classical CAN frame.
 _LENGTH_MAX = 8
 # s that the last command to a serial adapter may take.
@@ -139,7 +140,8 @@ class Port(EndPoint):
             if self._earliest - began < timeout:
                 self._returned_early(self._earliest)
             self._limit_line()
-            if self._answers is not None and self._answers.takes_nothing(self._earliest):
+            if (self._answers is not None and self._answers.takes_nothing(self._earliest)
+                    and self._below is not None and not self._below.unread):
                 self._lost = True
                 raise BusUnavailable(together(
                     [bus_sentences.adapter_refuses_frames(), ADVICE_ALONE]))
@@ -248,13 +250,15 @@ class Port(EndPoint):
         """
         if self._answers is None:
             return
-        left = _ANSWER_TIME
+        left = _SILENCE
         while left > 0.0:
-            answered, began = self._answers.answered, self._now()
+            unanswered, began = self._answers.unanswered, self._now()
             self.receive(_ANSWER_LOOK)
-            # another one may come: the first ones were of earlier commands then
-            if self._answers.complete and answered == self._answers.answered:
-                break
+            if 0 < self._answers.unanswered < unanswered:
+                # the last one may be lacking for good: C
+                left = _SILENCE if self._answers.unanswered == 1 else _LONG_SILENCE
+            elif unanswered <= 0 and unanswered == self._answers.unanswered:
+                break   # fewer: the first ones answered earlier commands
             # a process that did not run meanwhile has not looked for longer
             left -= min(self._now() - began, _ANSWER_LOOK)
         refusal = self._answers.refusal(bitrate)

@@ -85,14 +85,9 @@ class AdapterAnswers:
             self._commands.append(command)
 
     @property
-    def answered(self) -> int:
-        """How many commands of the opening were answered; some adapters answer none."""
-        return len(self._said)
-
-    @property
-    def complete(self) -> bool:
-        """Whether each command of the opening may have been answered."""
-        return self._commands is not None and len(self._said) >= len(self._commands)
+    def unanswered(self) -> int:
+        """How many commands of the opening have no answer; below 0: others were answered, too."""
+        return len(self._commands or ()) - len(self._said)
 
     def refusal(self, bitrate: int) -> Sentence:
         """
@@ -265,6 +260,14 @@ class Below:
         look.register(place, 0)     # a hang-up is reported without being asked for
         return any(event & (select.POLLHUP | select.POLLERR | select.POLLNVAL)
                    for _, event in look.poll(0))
+
+    @property
+    def unread(self) -> bool:
+        """Whether something has arrived that was not read yet."""
+        try:
+            return bool(self.port.in_waiting)
+        except OSError:
+            return False    # its device has gone
 
     def clear(self) -> None:
         """Discard what the adapter has not read, and end what it has read a part of."""

@@ -22,6 +22,7 @@ import can
 from clocks import HandClock, REAL
 from literal_adapters import Attached, Canable, Canable25, Esp32, Firmware, Lawicel, Usbtin
 import pytest
+from waiting import DEADLINE
 
 from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import BusConfiguration
@@ -736,6 +737,8 @@ class Answers(FakeBus):
 @pytest.mark.parametrize(('script', 'seconds', 'why'), [
     ('', 0.16, ''), ('++++', 0.02, ''), ('-++-', 0.02, ''),
     ('+++', 0.16, ''),          # CANable 2.5
+    ('+' + 24 * '_' + '-+-', 0.5, 'the adapter refuses bit rate 125000'),
+    ('++', 0.5, ''), ('+-++++++', 0.02, ''),
     ('+__-+-', 0.06, 'the adapter refuses bit rate 125000'),
     ('_______+-+-', 0.16, 'the adapter refuses bit rate 125000'),
     ('+!-+-', 1.02, 'the adapter refuses bit rate 125000'),
@@ -752,6 +755,25 @@ def test_late_answers_are_awaited(script: str, seconds: float, why: str) -> None
     else:
         port.await_answers(125_000)
     assert bus.now == pytest.approx(seconds, abs=0.025)
+
+
+def test_what_stands_behind_refusals_is_read_before_they_count() -> None:
+    """Read late, four refusals of one moment are far apart."""
+    bus = Answers('')
+    port = Port(bus, HandClock(lambda: bus.now))
+    port.await_answers(125_000)
+    below = bus.drive_can_below
+    assert below.answers is not None
+    below.port = SimpleNamespace(in_waiting=3)
+    for _ in range(8):
+        below.answers.sent()
+    bus.script.extend('-!---+-!---')
+    for _ in range(11):
+        port.receive(0.02)
+    assert port.counts.refused == 8
+    below.port.in_waiting = 0
+    with pytest.raises(BusUnavailable, match='the adapter refuses frames'):
+        port.receive(0.02)
 
 
 class DoesNotOpen(Usbtin):
@@ -776,9 +798,13 @@ class Canable25Refuses(Canable25):
     (Esp32, 50_000, 'the adapter refuses bit rate 50000'),
     (Canable25Refuses, 125_000, 'the adapter does not open'),
     (DoesNotOpen, 125_000, 'the adapter does not open')])
-def test_adapters_are_believed(firmware: type[Firmware], bitrate: int, why: str) -> None:
+def test_adapters_are_believed(monkeypatch: pytest.MonkeyPatch, firmware: type[Firmware],
+                               bitrate: int, why: str) -> None:
     adapter = firmware()
     attached = Attached(adapter.take)
+    if why:     # the terminal of a busy machine takes longer than any adapter
+        monkeypatch.setattr(port_module, '_SILENCE', 1.0)
+        monkeypatch.setattr(port_module, '_LONG_SILENCE', DEADLINE)
     try:
         for _ in range(2):      # closed, and as it was left by a process that died
             bus = BusConfiguration('main', 'slcan', attached.path, bitrate=bitrate)
