@@ -87,6 +87,7 @@ class SafeStop(Generic[StepT, ReplyT]):
     :param word: the control word, where no profile has it.
     :param read: (word, s to wait for the answer): reads it once; None: no answer.
     :ivar running: it is under way.
+    :ivar again: the last one was told again.
     :ivar again_at: when one that was told again had run its course, the last time.
     """
 
@@ -94,7 +95,7 @@ class SafeStop(Generic[StepT, ReplyT]):
                  ended: Callable[[], None], status: Parameter | None,
                  read: Callable[[Parameter, float], StatusRead[StepT, ReplyT]],
                  word: Parameter | None = None) -> None:
-        self.running = False
+        self.running = self.again = False
         self.again_at = -math.inf
         self._status, self._read = status, read
         self._session = session
@@ -137,7 +138,7 @@ class SafeStop(Generic[StepT, ReplyT]):
         :param again: that it failed before was told: what is new is that it does not.
         """
         session = self._session
-        self.running = True
+        self.running, self.again = True, again
         kind = _Kind(session.stop_pending and not again, always_report, again,
                      setpoints and not session.interlock.position_unknown)
         self._channel.run(

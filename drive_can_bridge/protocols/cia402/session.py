@@ -460,9 +460,10 @@ class Cia402Session(Session):
             self._see_to_limits(now)
 
     def _take_heartbeat(self, state: NmtState, now: float) -> None:
+        stopped = state is NmtState.STOPPED and not self._stopped_by_nmt(now)
         change = self._node.receive_heartbeat(state, now)
         if self.stage is Stage.STOPPING:
-            self._no_pdos_at_the_end(state, now)
+            self._no_pdos_at_the_end(state, now, stopped=stopped)
         if self.stage is not Stage.RUNNING:
             return
         self._answers.timing.heartbeat(self._node.silent_for)
@@ -476,8 +477,9 @@ class Cia402Session(Session):
             self._stop.forget()
             self.outbox.drop(self._of_the_conversation, now)
             self._close(reason, now, START_SPACING)
-        elif state is NmtState.STOPPED and self._stop.running:
-            self._no_answer_comes(now)
+        elif state is NmtState.STOPPED and self._stop.running or (
+                stopped and self.may_run and not self.exchange.cycling):
+            self._amid_stop(now, stopped=stopped)
         elif state is not NmtState.OPERATIONAL and self.exchange.cycling and (
                 state is NmtState.STOPPED or not self.exchange.leaving
                 and now > self._node_set_up.nmt_at + START_PAUSE + START_SPACING
@@ -493,14 +495,25 @@ class Cia402Session(Session):
             frame.identifier == network.NMT_IDENTIFIER
             and frame.data[1] == self.configuration.station)
 
-    def _no_pdos_at_the_end(self, state: NmtState, now: float) -> None:
+    def _no_pdos_at_the_end(self, state: NmtState, now: float, *, stopped: bool) -> None:
         """Stop a node by SDO, at the end, that takes no PDOs any more."""
         if self.exchange.cycling and self.unacknowledged and state is not NmtState.OPERATIONAL:
             self.exchange.mark_silent()
             self.exchange.stop()
             self._stop_by_sdo(now)
         elif state is NmtState.STOPPED and self._stop.running:
+            self._amid_stop(now, stopped=stopped)
+
+    def _amid_stop(self, now: float, *, stopped: bool) -> None:
+        """Handle a node to be stopped that NMT has stopped; ``stopped``: since its last sign."""
+        if not stopped:
             self._no_answer_comes(now)
+            return
+        again = self._stop.again or not self._stop.running
+        self._channel.cancel(Priority.STOP)     # what it was told before, it may not have taken
+        self._stop.forget()
+        self.duty.happened(Happened.SHOWED_UP)
+        self._stop_by_sdo(now, again=again)
 
     def _no_answer_comes(self, now: float) -> None:
         """End what is under way at once: a node that NMT has stopped answers nothing."""
@@ -614,7 +627,7 @@ class Cia402Session(Session):
             return
         self._channel.make_room(now)
         if self._stopped_by_nmt(now):
-            self._no_answer_comes(now)
+            self._transactor.abandon(now)
         writes = [each._replace(raw=self._machine.word) if each.is_word else each
                   for each in self._stop.writes()]
         self._stop.begin(self._see_it_stop(writes, unanswered=unanswered), now, again=again)

@@ -85,6 +85,19 @@ class TestStoppedInMotion:
         assert told(axis)[:2] == [(at, PRE_OPERATIONAL), (at, DISABLE)]
         assert axis.drive.state == axis.drive.ON
 
+    @pytest.mark.parametrize('since', [0.3, 0.65, 0.9])
+    def test_its_heartbeat_says_so_when_it_was_told_in_vain(self, since: float) -> None:
+        axis = running()
+        axis.deaf = True
+        while not doubts(axis):
+            axis.live(0.001)
+        axis.live(since)
+        axis.deaf = False
+        axis.take()
+        at = stopped(axis, tells=True)
+        assert told(axis)[:2] == [(round(at, 6), PRE_OPERATIONAL), (round(at, 6), DISABLE)]
+        assert axis.drive.state == axis.drive.ON
+
     @pytest.mark.parametrize('beat, first', [('705#04', PRE_OPERATIONAL), ('705#7F', DISABLE)])
     def test_it_was_disabled_a_moment_before(self, beat: str, first: str) -> None:
         axis = running()
@@ -312,6 +325,19 @@ class TestStoppedAtTheEnd:
         axis.live(2.0)
         assert axis.session.stopped
         assert axis.drive.state in (axis.drive.ON, axis.drive.READY)
+        assert doubts(axis) == []
+
+    def test_its_heartbeat_says_so_when_it_was_told_in_vain(self) -> None:
+        axis = running()
+        axis.deaf = True
+        axis.deliver(axis.talk.deactivate(axis.now))
+        while '605#23FF600000000000' not in axis.take():
+            axis.live(0.001)
+        axis.deaf = False
+        at = stopped(axis, tells=True)
+        assert told(axis)[:2] == [(round(at, 6), PRE_OPERATIONAL), (round(at, 6), DISABLE)]
+        axis.live(0.1)
+        assert axis.session.stopped
         assert doubts(axis) == []
 
     def test_one_that_is_silent_is_named_and_the_end_comes(self) -> None:
