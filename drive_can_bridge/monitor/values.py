@@ -21,9 +21,9 @@ _BOOLS = {'true': True, 'on': True, 'false': False, 'off': False}
 _ROLES = {'cyclic': sentences.setpoint_of_bridge(), 'control': sentences.word_of_bridge(),
           'map': sentences.map_of_bridge()}
 #: names that show what a profile cannot: setpoints, those of CiA 402 (targets) too
-_MOVING = re.compile(r'(setpoint|control_word)$|(^|_)target(_|$)')
+_MOVING = re.compile(r'(setpoint|control_?word)$|(^|_)target(_|$)')
 #: the second of them and so on; one that is stored is no setpoint, but the preset of one
-_NUMBERED = re.compile(r'(setpoint|control_word)_?[0-9]+$')
+_NUMBERED = re.compile(r'(setpoint|control_?word)_?[0-9]+$')
 #: of an integer in a message, without its sign
 _BITS_MAX = 63
 _EXAMPLES = {ValueKind.INTEGER: ', such as 12 or 0x0C', ValueKind.DOUBLE: ', such as 12.5'}

@@ -201,6 +201,12 @@ def read_eds(text: str, protocols: Sequence[str] = (), *, axis: int | None = Non
     else:
         for draft in found.drafts:
             _take_step(draft)
+    if shift is not None:
+        for draft in found.drafts:
+            # what moves an axis, and the bridge does not send in a cycle, is no setting
+            if (shift or not draft.name) and draft.entry['access'] != 'ro' and (
+                    _BY_OBJECTS[0].is_command(Parameter('', index=draft.entry['index']))):
+                draft.entry['protected'] = True
     return found
 
 
@@ -684,12 +690,7 @@ def _standardise(found: FileContent, sections: Mapping[str, EdsSection], shift: 
              for name, entry in shipped.entries.items()}
     found.drafts = [draft for draft in found.drafts if draft.entry['index'] not in _BUILT_IN]
     for draft in found.drafts:
-        entry = draft.entry
-        draft.name = known.get((entry['index'], entry['subindex']), '')
-        # what moves an axis that the bridge does not enable is no setting
-        if entry['access'] != 'ro' and (shift or not draft.name) and _BY_OBJECTS[0].is_command(
-                Parameter('', index=entry['index'])):
-            entry['protected'] = True
+        draft.name = known.get((draft.entry['index'], draft.entry['subindex']), '')
     names = {draft.name for draft in found.drafts}
     raw = [draft for draft in found.drafts
            if not _complete(draft, shipped, units, names, turning)]

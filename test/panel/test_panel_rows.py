@@ -38,6 +38,7 @@ def test_a_name_stays_one_attribute(page: object, name: str) -> None:
     ('target', False), ('target_position', False), ('vl_target_velocity', False),
     ('interpolation_target', False), ('speed_setpoint', False), ('control_word', False),
     ('setpoint_2', False), ('speed_setpoint_10', False), ('control_word2', False),
+    ('controlword', False), ('controlword_2', False), ('control_words', True),
     ('setpoint_source', True), ('targets', True), ('retarget_time', True)])
 def test_what_moves_a_drive_has_no_field(page: object, name: str, edited: bool) -> None:
     from drive_can_bridge.panel.drive_page import _ParameterRow

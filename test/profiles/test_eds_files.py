@@ -202,12 +202,15 @@ def test_one_of_several_axes(tmp_path: Path, axis: int | None, shift: int, unit:
     assert ('the control word of the first axis, 6040h' in said) is (axis == 2)
 
 
-def test_what_moves_an_axis_that_the_bridge_does_not_enable_is_protected(tmp_path: Path) -> None:
-    wheels = ('60FFsub1', 'Left', 4, 'rw', ''), ('60FFsub2', 'Right', 4, 'rw', '')
-    for entries, axis in ((TWO, 2), ((*TWO, *wheels), 1)):
-        made = bring(tmp_path, *entries, axis=axis)
-        assert {each.name for each in made.parameters.values() if each.protected} == (
-            {'controlword', 'target_position'} if axis == 2 else {'left', 'right'})
+@pytest.mark.parametrize(('axis', 'protocols', 'protected'), [
+    (1, (), {'left', 'right'}), (2, (), {'controlword', 'target_position'}),
+    (1, ('canopen_pkw',), {'controlword', 'where_to', 'left', 'right'}),
+    (2, ('canopen_pkw',), {'controlword', 'where_to'})])
+def test_what_moves_an_axis_that_the_bridge_does_not_command_is_protected(
+        tmp_path: Path, axis: int, protocols: Any, protected: set[str]) -> None:
+    made = bring(tmp_path, *TWO, ('60FFsub1', 'Left', 4, 'rw', ''),
+                 ('60FFsub2', 'Right', 4, 'rw', ''), axis=axis, protocols=protocols)
+    assert {each.name for each in made.parameters.values() if each.protected} == protected
 
 
 @pytest.mark.parametrize(('axis', 'entries', 'has'), [
