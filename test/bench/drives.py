@@ -243,7 +243,7 @@ class ServoDrive:
     Stopped by NMT, it hears no SDO and no PDO, and its motor goes on (CiA 301; all stacks).
 
     :ivar now: s, of the frame that it takes, where the bench tells it.
-    :ivar objects: (index, sub-index) -> content, low byte first.
+    :ivar objects: (index, sub-index) -> content, low byte first; ``initial``: in its flash.
     :ivar state: the bits of the status word that tell it.
     :ivar told: the control words that it was sent, in order, without repetitions.
     :ivar cut_short: how often 0000h has ended its braking.
@@ -280,7 +280,7 @@ class ServoDrive:
                 self.objects[at + pdo, 2] = b'\xFF'
                 self.objects[at + pdo + 0x200, 0] = b'\0'
         self.objects.update(objects or {})
-        self._initial = dict(self.objects)
+        self.initial = dict(self.objects)
 
     def in_cycle(self, sent: Frame) -> bool:
         """Return whether a frame is no SDO."""
@@ -328,7 +328,7 @@ class ServoDrive:
 
     def restarts(self) -> list[Frame]:
         """Be switched off and on: disabled, and what was written of the PDOs is forgotten."""
-        self.objects.update({place: content for place, content in self._initial.items()
+        self.objects.update({place: content for place, content in self.initial.items()
                              if place[0] < 0x2000 or place[0] in (0x6060, 0x6061)})
         self.operational = self.stopped = False
         self.becomes(self.OFF)

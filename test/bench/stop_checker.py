@@ -44,6 +44,8 @@ from kinds import KINDS, PERIOD
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import Noted, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.requests import ReadRequest, WriteRequest
+from drive_can_bridge.core.sentences import bridge_inactive
 from drive_can_bridge.protocols.families import make_sessions
 
 #: s until a frame is answered, and by a drive that is late
@@ -52,6 +54,8 @@ PROMPT, LATE, LATER, SLOW, SLOWER = 0.002, 1.4 * PERIOD, 0.16, 0.27, 0.4
 STOPPED_AFTER = 3.0
 #: stories that are told of each kind before the next has its turn
 AT_ONCE = 100
+#: s that a drive is left alone after an internal error, and for which its stop is waited for
+LEFT_ALONE, STOP_MARGIN = 1.0, 0.5
 #: s until the bridge has looked at maps that somebody has changed
 MAPS_LOOKED_AT = 1.2
 #: s by which a setpoint may be older than ``command_timeout`` when it reaches the drive
@@ -64,7 +68,9 @@ RAW, VALUE, COMMANDED_EVERY = 50, 5.0, 0.1
 THINGS = ('run', 'enable', 'zero', 'quiet', 'disable', 'quick_stop', 'silent', 'mute', 'late',
           'twice', 'well', 'power', 'stall', 'late process', 'bus down', 'bus up', 'refuses',
           'maps', 'response map', 'maps right', 'nmt stop', 'end', 'begin', 'slow', 'lossy',
-          'cycles lost', 'requests lost', 'trips', 'reset', 'nmt start', 'later', 'slower')
+          'cycles lost', 'requests lost', 'trips', 'reset', 'nmt start', 'later', 'slower',
+          'half refused', 'impatient', 'patient', 'asks', 'defect', 'cut end',
+          'forgets')
 PAUSES = (0.013, 0.9)
 Story = tuple[tuple[str, float], ...]
 
@@ -137,8 +143,10 @@ class World:
         self.leader = self.sessions[0]
         self.control = self.leader.control is not None
         self.deaf = self.mute = self.twice = self.refusing = False
-        self.lossy = self.cycles_lost = self.requests_lost = False
+        self.lossy = self.cycles_lost = self.requests_lost = self.half_refusing = False
         self.frames = 0     # both ways, while some are lost
+        self.handed_out = 0     # while some are refused
+        self.failed_at = math.inf
         self.sync_lost = False      # none was heard since
         self.bus = self.active = True
         self.delay = PROMPT
@@ -163,13 +171,20 @@ class World:
         """Have the drives hear what the sessions send, and listen to these."""
         for session, partner in zip(self.sessions, self.partners):
             while frames := session.take_frames():
-                if not self.refusing and self.bus:
-                    for each in frames:
+                refused = [place for place in range(len(frames)) if self.refuses()]
+                for place, each in enumerate(frames):
+                    if place not in refused:
                         self.hear(each)
-                session.frames_left(
-                    self.now, range(len(frames)) if self.refusing or not self.bus else ())
+                    elif self.half_refusing and each.identifier == 0x80:
+                        self.sync_lost = True
+                session.frames_left(self.now, refused)
             for event in session.take_events():
                 self.told(partner, event)
+
+    def refuses(self) -> bool:
+        """Return whether the bus does not take a frame."""
+        self.handed_out += self.half_refusing
+        return self.refusing or not self.bus or self.half_refusing and self.handed_out % 2 == 0
 
     def hear(self, sent: Frame) -> None:
         lost = self.deaf or self.drops(2)
@@ -231,14 +246,30 @@ class World:
     def live(self, seconds: float) -> None:
         """Let time pass."""
         end = self.now + seconds
-        self.coming.live(self, end, due=lambda: min(self.publish_at, *(
+        self.coming.live(self, end, due=lambda: min(self.publish_at, self.recover_at, *(
             session.next_timer() for session in self.sessions), math.inf),
             timers=self.timers, then=self.judged)
         self.now = end
         self.judged()   # also where nothing has happened, as on a bus that is down
 
+    @property
+    def recover_at(self) -> float:
+        """When those that were left alone are looked for again; infinity: they are not."""
+        if not self.active or self.failed_at == math.inf:
+            return math.inf
+        done = all(session.stopped for session in self.sessions)
+        return self.failed_at + (LEFT_ALONE if done else max(LEFT_ALONE, STOP_MARGIN + max(
+            session.longest_stop for session in self.sessions)))
+
     def timers(self) -> None:
         self.publish()
+        if self.now >= self.recover_at:
+            for session in self.sessions:
+                if not session.stopped:
+                    session.give_up(self.now)
+            self.failed_at = math.inf
+            for session in self.sessions:
+                session.recover(self.now)
         for session in self.sessions:
             if session.next_timer() <= self.now:
                 session.handle_timer(self.now)
@@ -291,7 +322,7 @@ class World:
 
     def reachable(self) -> bool:
         return self.bus and not (self.deaf or self.mute or self.refusing or self.lossy
-                                 or self.cycles_lost or self.requests_lost)
+                                 or self.cycles_lost or self.requests_lost or self.half_refusing)
 
     def judge(self) -> None:
         """Judge motors that run although they shall not, and those that do not brake."""
@@ -424,7 +455,7 @@ class World:
 
     def _well(self) -> None:
         self.deaf = self.mute = self.twice = self.refusing = False
-        self.lossy = self.cycles_lost = self.requests_lost = False
+        self.lossy = self.cycles_lost = self.requests_lost = self.half_refusing = False
         self.delay = PROMPT
 
     def _power(self) -> None:
@@ -442,6 +473,15 @@ class World:
                 if not partner.boot_up_lost:
                     self.comes(self.now + 0.001, partner.index,
                                frame(f'{0x700 + partner.device.node:03X}#00'))
+
+    def _forgets(self) -> None:
+        """Lose power, and be mapped as delivered then."""
+        self._maps()
+        for partner in self.partners:
+            if isinstance(partner.device, ServoDrive) and (
+                    self.leader.configuration.options.mapping != 'assume'):
+                partner.device.initial[0x1600, 2] = bytes.fromhex('20007A60')
+        self._power()
 
     def ends_unless_unseen(self) -> None:
         """Record a restart; a call that waits for its answer goes on."""
@@ -492,6 +532,38 @@ class World:
     def _refuses(self) -> None:
         self.refusing = True
 
+    def _half_refused(self) -> None:
+        self.half_refusing = self.now >= self.looked_at     # as above
+
+    def _impatient(self) -> None:
+        self.reconfigures(command_timeout=0.2, parameter_timeout=0.02)
+
+    def _patient(self) -> None:
+        self.reconfigures(command_timeout=COMMAND_TIMEOUT, parameter_timeout=0.3)
+
+    def reconfigures(self, **changes: float) -> None:
+        """Have a user change what may change while drives run."""
+        for session in self.sessions:
+            session.reconfigure(**changes)
+
+    def _asks(self) -> None:
+        """Have users read and write all that they may, several times over."""
+        for session in self.sessions:
+            table = session.configuration.profile.parameters.values()
+            readable = tuple(each for each in table if each.readable)
+            for each in readable * 2:
+                session.services.submit(ReadRequest((each,)), self.now)
+                if not session.services.write_refusal(each):
+                    session.services.submit(WriteRequest(((each, 1),)), self.now)
+
+    def _defect(self) -> None:
+        """Have the program fail, in what belongs to all of them."""
+        if self.active and self.failed_at == math.inf:
+            self.failed_at = self.now
+            self.ends()
+            for session in self.sessions:
+                session.fail(bridge_inactive(), self.now)
+
     def _nmt_stop(self) -> None:
         """Have another master stop the nodes by NMT: they hear no PDO and no SDO, and run on."""
         self.commanded_by_nmt(2)
@@ -528,10 +600,16 @@ class World:
                 for number in range(122, 130):
                     partner.motor[number] = partner.motor.initial[number]
 
+    def _cut_end(self) -> None:
+        """End, and lose the bus meanwhile."""
+        self.coming.plan(max(self.now, self.looked_at) + 0.07, self._bus_down)
+        self._end()
+
     def _end(self) -> None:
         """End, as the exchange does: wait for the stop, give up at last."""
         if not self.active:
             return
+        self.failed_at = math.inf
         if self.now < self.looked_at:   # until then nobody knows of other maps
             self.live(self.looked_at - self.now)
         self.active = False
