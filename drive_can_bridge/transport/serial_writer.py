@@ -41,8 +41,9 @@ FILLERS = {
     # 19, likewise
     'serial': bytes(19),
 }
-#: s of silence behind the filler until commands are sent, and s that it is waited for at most
-_QUIET, _NOISE = 0.05, 0.3
+#: s in which the first answer to the filler and to C comes, if any; s of silence behind it until
+#: commands are sent, and s that it is waited for at most
+_FIRST, _QUIET, _NOISE = 0.16, 0.05, 0.3
 REFUSED, DONE = '\a', '\r'
 #: of lines that are data frames: where their length is, one digit in front of the data
 _LENGTH_AT = {'t': 4, 'T': 9, 'x': 9}
@@ -321,9 +322,10 @@ def _hurry(port: Any) -> None:
 def _await_quiet(port: Any, now: Callable[[], float]) -> None:
     """Close the channel, and discard what the adapter sends: none of it answers a command."""
     port.write(b'C\r')
-    patience, port.timeout = port.timeout, _QUIET
+    patience, port.timeout = port.timeout, _FIRST
     until = now() + _NOISE
     while now() < until and port.read(1):
+        port.timeout = _QUIET
         port.reset_input_buffer()
     port.timeout = patience
 

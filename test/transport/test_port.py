@@ -28,7 +28,7 @@ from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame, Route
-from drive_can_bridge.transport import port as port_module
+from drive_can_bridge.transport import port as port_module, serial_writer
 from drive_can_bridge.transport.port import open_port, Port
 from drive_can_bridge.transport.serial_writer import AdapterAnswers, Below
 
@@ -757,6 +757,34 @@ def test_late_answers_are_awaited(script: str, seconds: float, why: str) -> None
     assert bus.now == pytest.approx(seconds, abs=0.025)
 
 
+@pytest.mark.parametrize(('answers', 'seconds', 'left'), [
+    ({}, 0.16, 0), ({0.15: 7}, 0.2, 0), ({0.01: 1, 0.05: 6}, 0.1, 0),
+    ({0.01: 1, 0.07: 4}, 0.06, 4)], ids=['none', 'late', 'in parts', 'too late'])
+def test_answers_to_what_was_before_are_not_those_of_the_opening(
+        answers: dict[float, int], seconds: float, left: int) -> None:
+    class Answering:
+        """A port that is answered so many bytes at those times."""
+
+        now, timeout = 0.0, 0.001
+
+        def write(self, data: bytes) -> None:
+            assert data == b'C\r'
+
+        def read(self, size: int) -> bytes:
+            came = min(answers, default=9.0)
+            self.now = max(self.now, min(came, self.now + self.timeout))
+            return b'\a' if came <= self.now else b''
+
+        def reset_input_buffer(self) -> None:
+            del answers[min(answers)]
+
+    port = Answering()
+    serial_writer._await_quiet(port, lambda: port.now)
+    assert port.now == pytest.approx(seconds)
+    assert sum(answers.values()) == left
+    assert port.timeout == 0.001
+
+
 def test_what_stands_behind_refusals_is_read_before_they_count() -> None:
     """Read late, four refusals of one moment are far apart."""
     bus = Answers('')
@@ -805,11 +833,13 @@ def test_adapters_are_believed(monkeypatch: pytest.MonkeyPatch, firmware: type[F
     if why:     # the terminal of a busy machine takes longer than any adapter
         monkeypatch.setattr(port_module, '_SILENCE', 1.0)
         monkeypatch.setattr(port_module, '_LONG_SILENCE', DEADLINE)
+        monkeypatch.setattr(serial_writer, '_FIRST', DEADLINE)
     try:
         for _ in range(2):      # closed, and as it was left by a process that died
             bus = BusConfiguration('main', 'slcan', attached.path, bitrate=bitrate)
             if not why:
                 port = open_port(bus, REAL)
+                attached.handled()
                 assert adapter.channel_open
                 port._bus._is_shutdown = True   # by SIGKILL
                 port._below.port.close()        # type: ignore[union-attr]
