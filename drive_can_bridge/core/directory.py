@@ -8,6 +8,7 @@ storage, limits. Only its value is raw: the unsigned integer on the wire.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+import re
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import ValueRefused
@@ -21,6 +22,8 @@ _ACCESS = (AccessMode.READ_ONLY, AccessMode.WRITE_ONLY, AccessMode.READ_WRITE)
 _STORAGE = (Storage.EEPROM, None, Storage.RAM)
 #: bits of an integer that are looked at; no type has as many
 _BITS_MAX = 64
+#: index and sub-index, or number
+_NUMBER = re.compile('(?:0x|[xp])?([0-9][0-9a-f]{0,4})h?(?:[.:]([0-9a-f]{1,3})h?)?', re.ASCII)
 #: characters of an unknown name: it stands beside another in one line
 NAME_SHOWN = 80
 
@@ -74,9 +77,18 @@ class ParameterDirectory:
 
     def unknown(self, name: str, *, hint: bool = True) -> Sentence:
         """Return that a name is unknown, with the nearest known one (which takes milliseconds)."""
-        near = nearest(name, self.listed) if hint else None
+        near = (self._raw_name(name) or nearest(name, self.listed)) if hint else None
         shown = printable(name, NAME_SHOWN) or "''"
         return sentences.unknown_parameter(shown, near)
+
+    def _raw_name(self, written: str) -> str | None:
+        """Return the raw name of a number as manuals write it (6041h, 1018:01, P102), if any."""
+        number = _NUMBER.fullmatch(written.lower())
+        if number is None:
+            return None
+        main, sub = number.groups()
+        guesses = (f'p{main}.{sub}', f'x{main}.{sub}') if sub else (f'p{main}', f'x{main}.0')
+        return next((guess for guess in guesses if self._raw_parameter(guess)), None)
 
     def raw_from_user(self, parameter: Parameter, value: object) -> int:
         """

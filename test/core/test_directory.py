@@ -16,8 +16,8 @@ from drive_can_bridge.core.parameters import AccessMode, Parameter, ParameterTyp
 from drive_can_bridge.protocols.families import FAMILIES
 
 
-def directory(*table: Parameter) -> ParameterDirectory:
-    family = FAMILIES['datamodel_extended']
+def directory(*table: Parameter, protocol: str = 'datamodel_extended') -> ParameterDirectory:
+    family = FAMILIES[protocol]
     configuration = drive(table=table or TABLE)
     return ParameterDirectory(configuration.profile.parameters,
                               lambda name: family.raw_parameter(configuration, name))
@@ -64,6 +64,19 @@ def test_unknown_names_get_a_hint() -> None:
         'unknown_parameter', name='ramp_tme', nearest='ramp_time')
     assert names.unknown('zzz') == says('unknown_parameter', name='zzz', nearest=None)
     assert names.unknown('') == says('unknown_parameter', name="''", nearest=None)
+
+
+@pytest.mark.parametrize(('protocol', 'written', 'nearest'), [
+    ('cia402', 'x6041', 'x6041.0'), ('cia402', 'X1018.1', 'x1018.1'),
+    ('cia402', '6041h', 'x6041.0'), ('cia402', '0x60FF', 'x60ff.0'),
+    ('cia402', '1018h.01h', 'x1018.01'), ('cia402', '1018:01', 'x1018.01'),
+    ('cia402', '60411', None),
+    ('cannord', 'P102', 'p102'), ('cannord', '102', 'p102'), ('cannord', 'p9999', None),
+    ('datamodel_extended', '600', 'p600'), ('canopen_pkw', 'P455', 'p455')])
+def test_numbers_as_manuals_write_them_get_a_hint(
+        protocol: str, written: str, nearest: str | None) -> None:
+    assert directory(protocol=protocol).unknown(written) == says(
+        'unknown_parameter', name=written, nearest=nearest)
 
 
 @pytest.mark.parametrize('entry, value, raw', [
