@@ -14,7 +14,7 @@ from drive_can_bridge.core import bus_sentences
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.process.locks import Held, holder, HostLock, take
-from drive_can_bridge.process.presence import BRIDGE
+from drive_can_bridge.process.presence import BRIDGE, BESIDES
 from drive_can_bridge.transport.bus_identity import identity_of
 
 #: what to do for commands that have only the direct way
@@ -42,9 +42,11 @@ class Ownership:
     def __init__(self, buses: Iterable[tuple[BusConfiguration, Sequence[DriveConfiguration]]],
                  who: str, advice: str) -> None:
         claims: dict[str, str] = {}
+        drive_keys: set[str] = set()    # one for each: others count them
         for bus, drives in buses:
             identity = identity_of(bus)
             for drive in drives:
+                drive_keys.add(f'drive {identity.names[0]} {drive.protocol} {drive.station}')
                 for name in identity.names:
                     claims[f'drive {name} {drive.protocol} {drive.station}'] = (
                         f'bus {bus.name}: drive {drive.name}')
@@ -52,7 +54,8 @@ class Ownership:
                 claims.update(dict.fromkeys(
                     identity.names, f'bus {bus.name}: the serial port {identity.port}'))
         try:
-            self._locks: list[HostLock] = take(list(claims), who)
+            self._locks: list[HostLock] = take({
+                key: who if key in drive_keys or who != BRIDGE else BESIDES for key in claims})
         except Held as held:
             # which one failed is chance: the first in the caller's order is clearest
             for key, what in claims.items():
@@ -75,7 +78,7 @@ class Ownership:
 
 def _in_words(held: Held, what: str, advice: str) -> InUse:
     process = held.in_words
-    if held.who not in ('', BRIDGE):
+    if held.who not in ('', BRIDGE, BESIDES):
         process += f' ({held.who.replace("_", " ").replace("drive can", "drive_can")})'
         advice = bus_sentences.wait_or_end()
     return InUse(bus_sentences.in_use(what=what, process=process, advice=advice))

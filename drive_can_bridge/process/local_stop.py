@@ -423,7 +423,7 @@ def may_match(present: Present, around: Iterable[str], words: Sequence[str]) -> 
     """
     Return whether words may mean a drive of a bridge that does not answer.
 
-    They do not where the graph shows as many drives of it as it has locks, and none is meant.
+    They do not where the graph shows as many drives of it as it has locked, and none is meant.
 
     :param around: drives in the graph of no other bridge.
     """
@@ -431,4 +431,4 @@ def may_match(present: Present, around: Iterable[str], words: Sequence[str]) -> 
         return not words
     its = [node for node in around if present.has_place
            and node.rpartition('/')[0] == present.name.rpartition('/')[0]]
-    return not 0 < present.locks <= len(its) or any(meant(words, node) for node in its)
+    return not 0 < present.drives <= len(its) or any(meant(words, node) for node in its)

@@ -12,7 +12,7 @@ Beside each lock its holder has a second name that identifies it; ``/proc/net/un
 everybody.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 import errno
 import hashlib
 import os
@@ -85,18 +85,19 @@ class HostLock:
             self._sockets.pop().close()
 
 
-def take(keys: Sequence[str], who: str) -> list[HostLock]:
+def take(holders: Mapping[str, str]) -> list[HostLock]:
     """
     Acquire several locks, or none.
 
     In the order of their keys, so that of two processes that want the same one gets all.
 
+    :param holders: by key, the name of its holder.
     :raises Held: one of them is held.
     """
     taken: list[HostLock] = []
     try:
-        for key in sorted(set(keys)):
-            taken.append(HostLock(key, who))
+        for key in sorted(holders):
+            taken.append(HostLock(key, holders[key]))
     except BaseException:
         for lock in taken:
             lock.release()

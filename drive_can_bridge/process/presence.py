@@ -20,8 +20,8 @@ from drive_can_bridge import host_texts
 
 #: all names begin with this
 PREFIX = 'drive_can_bridge'
-#: what a bridge calls itself where it locks drives
-BRIDGE = 'drive_can_bridge'
+#: what a bridge calls itself where it locks a drive, and what else it locks: ports, other names
+BRIDGE, BESIDES = 'drive_can_bridge', 'drive_can_bridge_besides'
 #: what the kernel shows of all sockets
 TABLE = '/proc/net/unix'
 #: switches the local way off: the value ``off``
@@ -52,14 +52,14 @@ def in_namespace(name: str, namespace: str) -> bool:
     return fnmatchcase(place, namespace)
 
 
-class Present(namedtuple('Present', 'process domain name locks')):
+class Present(namedtuple('Present', 'process domain name drives')):
     """
     A bridge of this host.
 
     :ivar process: number of its process.
     :ivar domain: its ROS domain; None: not known.
     :ivar name: its full name; '' where it is not known, cut where it is very long.
-    :ivar locks: how many locks its process holds, each of them that of a drive, or of a port.
+    :ivar drives: how many drives its process has locked.
     """
 
     __slots__ = ()
@@ -129,14 +129,14 @@ def bridges() -> list[Present]:
         words = rest.split('/', 2)
         if len(words) < 3:
             continue
-        if kind == 'who' and words[2] == BRIDGE and _is_number(words[1]):
-            holding[int(words[1])] = holding.get(int(words[1]), 0) + 1
+        if kind == 'who' and words[2] in (BRIDGE, BESIDES) and _is_number(words[1]):
+            holding[int(words[1])] = holding.get(int(words[1]), 0) + (words[2] == BRIDGE)
         elif kind == 'bridge' and words[2] and _is_number(words[0]) and _is_number(words[1]):
             if not any(map(str.isspace, words[2])):
                 told.add((int(words[0]), int(words[1]), f'/{words[2]}'))
     named = {process for process, *_ in told}
     return [Present(*each, holding.get(each[0], 0)) for each in sorted(told)] + [
-        Present(process, None, '', locks) for process, locks in sorted(holding.items())
+        Present(process, None, '', drives) for process, drives in sorted(holding.items())
         if process not in named]
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.exchange.one_master import InUse, Ownership
-from drive_can_bridge.process.presence import BRIDGE
+from drive_can_bridge.process.presence import BRIDGE, bridges
 
 ADVICE = 'leave --params-file away to go through it'
 CAN = BusConfiguration('main', 'socketcan', f'nowhere{os.getpid()}')
@@ -53,6 +53,17 @@ def test_drives_of_others_on_the_same_bus_are_free() -> None:
         same_station = drive('canopen_pkw', station=1, request=(), period=0.1)
         Ownership([(CAN, [same_station])], BRIDGE, ADVICE).release()
         Ownership([(CAN, [])], 'drive_can scan', ADVICE).release()
+
+
+@pytest.mark.parametrize('serial', [False, True])
+def test_others_see_how_many_drives_a_bridge_has(
+        port: tuple[BusConfiguration, BusConfiguration], serial: bool) -> None:
+    """A port has locks of its own, and as many names as people and udev give it."""
+    with Ownership([(port[1] if serial else CAN, [CONVEYOR, LIFT])], BRIDGE, ADVICE):
+        assert [each.drives for each in bridges() if each.process == os.getpid()] == [2]
+    with Ownership([(port[1], [])], BRIDGE, ADVICE):
+        assert [each.drives for each in bridges() if each.process == os.getpid()] == [0]
+    assert not [each for each in bridges() if each.process == os.getpid()]
 
 
 def test_a_serial_port_is_used_by_one(port: tuple[BusConfiguration, BusConfiguration]) -> None:

@@ -224,7 +224,7 @@ def test_one_that_dies_in_the_answer_has_stopped_what_it_said(
 def test_one_that_hangs_is_named_where_a_drive_of_it_may_be_meant(
         monkeypatch: pytest.MonkeyPatch, word: str, named: bool) -> None:
     """What others know of it counts, whatever ROS has found out until then."""
-    other = BRIDGE._replace(process=2, name='/other', locks=2)
+    other = BRIDGE._replace(process=2, name='/other', drives=2)
     said = [['drives', '/lift'], ['around', '/drive1', '/drive3'],
             ['bridge', '/bridge', '0', '/bridge', '/other'], ['end']]
     host = Host(monkeypatch, lambda _: said)

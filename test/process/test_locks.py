@@ -14,7 +14,7 @@ from drive_can_bridge.process.locks import Held, holder, HostLock, take
 HOLDER = """
 import sys, time
 from drive_can_bridge.process.locks import take
-locks = take(sys.argv[1:], 'drive_can write')
+locks = take(dict.fromkeys(sys.argv[1:], 'drive_can write'))
 print('taken', flush=True)
 time.sleep(600)
 """
@@ -51,14 +51,14 @@ def test_another_process_is_named_and_its_end_frees_at_once() -> None:
     process = elsewhere(key('a'), key('b'))
     try:
         with pytest.raises(Held) as caught:
-            take([key('b'), key('c')], 'x')
+            take(dict.fromkeys([key('b'), key('c')], 'x'))
         assert caught.value.process == process.pid
         assert caught.value.who == 'drive_can_write'
         assert holder(key('c')) is None     # all or nothing
     finally:
         process.kill()
         process.wait()
-    for lock in take([key('a'), key('b')], 'x'):
+    for lock in take(dict.fromkeys([key('a'), key('b')], 'x')):
         lock.release()
 
 
@@ -80,7 +80,7 @@ def test_of_many_at_once_one_gets_it() -> None:
         keys = [key('x'), key('y'), key('z')]
         start.wait()
         try:
-            won.append(take(keys[place % 3:] + keys[:place % 3], 'x'))
+            won.append(take(dict.fromkeys(keys[place % 3:] + keys[:place % 3], 'x')))
         except Held as held:
             lost.append(held)
     threads = [threading.Thread(target=compete, args=(place,)) for place in range(8)]
