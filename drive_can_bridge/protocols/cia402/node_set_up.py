@@ -298,6 +298,8 @@ class NodeSetUp:
             self._session.report.advise(sentences.node_state(self._node.state.text))
             while self._waits_for_start:
                 yield Transfer(pause=POLL_PERIOD)
+                if self._channel.now > self._node.heard_at + SILENCE_TIME / 2:
+                    yield Transfer(states.STATUS_WORD, attempts=1)  # SYNC is for those heard
 
     def _sync_begins(self, producer: SyncProducer) -> Procedure[None]:
         """Wait until there is SYNC: a drive that watches it needs it when it is started."""
@@ -332,7 +334,8 @@ class NodeSetUp:
 
     @property
     def _waits_for_start(self) -> bool:
-        return self._node.state not in (None, NmtState.OPERATIONAL)
+        node = self._node   # that it is operational, PDOs show as well
+        return node.said_since(node.pdo_at) not in (None, NmtState.OPERATIONAL)
 
     def wake(self, now: float) -> None:
         """Send a node that answers nothing to pre-operational, if NMT is our business."""

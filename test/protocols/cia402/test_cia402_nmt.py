@@ -249,6 +249,20 @@ class TestWhatElseItIsAsked:
         assert '605#4064600000000000' in axis.take()
 
 
+    @pytest.mark.parametrize('after', [0.5, 3.0])
+    def test_another_master_starts_one_that_sends_no_heartbeats(self, after: float) -> None:
+        axis = Axis(nmt_start=False, objects=FITS, **MUTE)     # type: ignore[arg-type]
+        axis.drive.operational = True
+        axis.online()
+        for said in axis.drive.restarts():
+            axis.says(str(said))
+        axis.live(after)
+        assert not axis.session.online
+        axis.drive.takes(Frame(0, b'\x01\x05', False))
+        axis.live(0.2)
+        assert axis.session.online
+
+
 class TestRestarts:
     """Nothing of the conversation before goes out behind the boot-up frame."""
 
