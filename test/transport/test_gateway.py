@@ -9,6 +9,7 @@ import threading
 from clocks import REAL
 from literal_adapters import Socketcand
 import pytest
+from waiting import wait_for
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable
@@ -35,14 +36,10 @@ def opened(port: int) -> Port:
         'host': '127.0.0.1', 'port': port}), REAL)
 
 
-def received(port: Port, seconds: float = 5.0) -> Frame:
+def received(port: Port) -> Frame:
     """Return the next frame."""
-    end = REAL.now() + seconds
-    while REAL.now() < end:
-        frame = port.receive(0.02)
-        if frame is not None:
-            return frame
-    raise AssertionError('nothing came')
+    found: Frame = wait_for(lambda: port.receive(0.02), 'a frame')
+    return found
 
 
 def test_frames_both_ways(gateway: Callable[..., Socketcand]) -> None:
