@@ -13,6 +13,7 @@ from builders import (
 from drives import CannordDrive, ExtendedDrive, Motor, MotorServo, PkwNode, StandardDrive
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 
 PERIOD = 0.05
@@ -52,6 +53,27 @@ class OptionlessServo(StayingServo):
     def __init__(self, node: int, motor: Motor) -> None:
         super().__init__(node, motor)
         del self.objects[0x605A, 0]
+
+
+class WatchingServo(MotorServo):
+    """CiA 402: trips when the node in 1016h has not been heard for as long as that says."""
+
+    def __init__(self, node: int, motor: Motor) -> None:
+        super().__init__(node, motor)
+        self._heard_at = math.inf       # not yet
+
+    def takes(self, sent: Frame) -> list[Frame]:
+        watched = self.number(0x1016, 1)
+        if sent.identifier == 0x700 + (watched >> 16):
+            self._heard_at = self.now
+        elif watched and self.now > self._heard_at + 0.001 * (watched & 0xFFFF):
+            self._heard_at = math.inf
+            self.registers.stops(faulty=True)
+        return super().takes(sent)
+
+    def restarts(self) -> list[Frame]:
+        self._heard_at = math.inf
+        return super().restarts()
 
 
 @dataclass(frozen=True)
@@ -153,6 +175,8 @@ KINDS: dict[str, Kind] = {
     'CiA 402, mapping assumed': _servo(mapping='assume'),
     'CiA 402, disabled by shutdown': _servo(disable_word='shutdown'),
     'CiA 402, by event': _servo(transmission='event'),
+    'CiA 402, with heartbeats': _servo(
+        WatchingServo, heartbeat_producer=0.1, heartbeat_timeout=0.35),
     'CiA 402, stays in quick stop': _servo(StayingServo),
     'CiA 402, stays in quick stop, no 605Ah': _servo(OptionlessServo),
     'CANnord': _cannord(),

@@ -60,6 +60,8 @@ LEFT_ALONE, STOP_MARGIN = 1.0, 0.5
 MAPS_LOOKED_AT = 1.2
 #: s by which a setpoint may be older than ``command_timeout`` when it reaches the drive
 SLACK = 0.12
+#: s between two heartbeats of a drive
+BEATS_EVERY = 0.1
 COMMAND_TIMEOUT = 0.5
 #: raw and physical value of the setpoint that users want, and how often they say so (s)
 RAW, VALUE, COMMANDED_EVERY = 50, 5.0, 0.1
@@ -157,6 +159,7 @@ class World:
         self.enabling = False   # a call that nobody has answered yet
         self.commanded_at = self.zero_at = -math.inf
         self.publish_at = math.inf
+        self.beat_at = self.now if 'heartbeats' in kind else math.inf
         for session in self.sessions:
             session.bus_up(self.now)
             session.activate(self.now)
@@ -203,6 +206,7 @@ class World:
         for partner in self.partners:
             if self.cycles_lost if partner.device.in_cycle(sent) else self.requests_lost:
                 continue
+            partner.device.now = self.now
             answers = partner.device.takes(sent)
             partner.motor.look()
             for answer in () if self.mute else answers * (1 + self.twice):
@@ -246,8 +250,9 @@ class World:
     def live(self, seconds: float) -> None:
         """Let time pass."""
         end = self.now + seconds
-        self.coming.live(self, end, due=lambda: min(self.publish_at, self.recover_at, *(
-            session.next_timer() for session in self.sessions), math.inf),
+        self.coming.live(self, end, due=lambda: min(
+            self.publish_at, self.recover_at, self.beat_at,
+            *(session.next_timer() for session in self.sessions)),
             timers=self.timers, then=self.judged)
         self.now = end
         self.judged()   # also where nothing has happened, as on a bus that is down
@@ -263,6 +268,11 @@ class World:
 
     def timers(self) -> None:
         self.publish()
+        if self.now >= self.beat_at:
+            self.beat_at = self.now + BEATS_EVERY
+            for partner in self.partners:
+                if partner.device.number(0x1017) and not (self.mute or self.drops(3)):
+                    self.comes(self.now + self.delay, partner.index, partner.device.beats())
         if self.now >= self.recover_at:
             for session in self.sessions:
                 if not session.stopped:
@@ -536,15 +546,16 @@ class World:
         self.half_refusing = self.now >= self.looked_at     # as above
 
     def _impatient(self) -> None:
-        self.reconfigures(command_timeout=0.2, parameter_timeout=0.02)
+        self.reconfigures(0.2, 0.02)
 
     def _patient(self) -> None:
-        self.reconfigures(command_timeout=COMMAND_TIMEOUT, parameter_timeout=0.3)
+        self.reconfigures(COMMAND_TIMEOUT, 0.3)
 
-    def reconfigures(self, **changes: float) -> None:
+    def reconfigures(self, command_timeout: float, parameter_timeout: float) -> None:
         """Have a user change what may change while drives run."""
         for session in self.sessions:
-            session.reconfigure(**changes)
+            session.reconfigure(
+                command_timeout=command_timeout, parameter_timeout=parameter_timeout)
 
     def _asks(self) -> None:
         """Have users read and write all that they may, several times over."""
