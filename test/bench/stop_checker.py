@@ -367,7 +367,7 @@ class World:
     def happens(self, thing: str) -> None:
         looking = self.now < self.looked_at
         getattr(self, '_' + thing.replace(' ', '_'))()
-        if looking and thing != 'end':      # which may keep the bridge from it
+        if looking and thing not in ('end', 'cut end'):      # which may keep the bridge from it
             self.looked_at = self.now + MAPS_LOOKED_AT
         self.took()
 
@@ -620,10 +620,9 @@ class World:
         """End, as the exchange does: wait for the stop, give up at last."""
         if not self.active:
             return
-        self.failed_at = math.inf
         if self.now < self.looked_at:   # until then nobody knows of other maps
             self.live(self.looked_at - self.now)
-        self.active = False
+        self.active, self.failed_at = False, math.inf
         self.ends()
         for partner in self.partners:
             partner.said = False
