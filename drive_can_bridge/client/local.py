@@ -25,6 +25,8 @@ from drive_can_bridge.process.presence import (
 LOOK_PERIOD = 0.0005
 #: s that an answer may take: many reads without an answer are slow
 CALL_TIMEOUT = 120.0
+#: messages that are read behind that: an answer that never ends is none
+_LATE_MAX = 10_000
 #: what parsing raises for an answer that is no bridge's
 _SENSELESS = (Rubbish, ValueError, IndexError)
 
@@ -92,14 +94,14 @@ class _Bridge:
         """
         found: list[list[str]] = []
         while True:
+            now = self._clock.now()     # before it looks: it may not run for a while
             message = self._line.take()
-            now = self._clock.now()
-            if message is not None and message[0] == END:
-                return found
-            if now > until:
+            if now > until and (message is None or len(found) >= _LATE_MAX):
                 raise TimeoutError
             if message is None:
                 self._clock.wait(now + LOOK_PERIOD)
+            elif message[0] == END:
+                return found
             elif message[0] == NO:
                 raise Rubbish(*message[1:])
             else:

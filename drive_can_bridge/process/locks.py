@@ -119,12 +119,13 @@ def _holder(digest: str) -> Held:
     deadline = time.monotonic() + _PATIENCE
     wanted = re.compile(rf'@{PREFIX}/who/{digest}/(\d+)/(\w*)$', re.MULTILINE)
     while True:
+        late = time.monotonic() > deadline      # before it looks: it may not run for a while
         try:
             found = wanted.search(Path(TABLE).read_text(encoding='utf-8', errors='replace'))
         except OSError:
             found = None
         if found is not None:
             return Held(int(found[1]), found[2])
-        if time.monotonic() > deadline:
+        if late:
             return Held(None, '')
         time.sleep(0.005)

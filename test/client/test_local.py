@@ -2,9 +2,10 @@
 """The local way at the end of a command: what bridges may say, and how they may end."""
 
 from collections.abc import Iterator
+from itertools import count
 from typing import Any
 
-from clocks import REAL
+from clocks import HandClock, REAL
 import pytest
 
 from drive_can_bridge.client import local
@@ -86,6 +87,24 @@ def test_one_connection_is_enough(host: Host) -> None:
     assert [list(way.get('/lift', ['ramp_time'])) for _ in range(50)] == [[1.5]] * 50
     assert len(host.lines) == 1
     way.close()
+
+
+def test_what_has_arrived_counts_however_late_it_is_read(host: Host) -> None:
+    minutes = count(0.0, 60.0)      # between any two looks this process does not run for one
+    way = local_way(None, HandClock(lambda: next(minutes)))
+    assert way is not None
+    host.said *= 9
+    assert list(way.get('/lift', ['ramp_time'])) == [1.5] * 9
+    way.close()
+
+
+def test_an_answer_that_never_ends_is_none(host: Host) -> None:
+    minutes = count(0.0, 60.0)
+    way = local_way(None, HandClock(lambda: next(minutes)))
+    assert way is not None
+    host.lines[0].take = lambda: ['value', 'd1.5']      # type: ignore[method-assign]
+    with pytest.raises(NoAnswer):
+        way.get('/lift', ['ramp_time'])
 
 
 def test_one_that_was_hung_up_on_for_its_silence_calls_again(host: Host) -> None:

@@ -2,13 +2,16 @@
 """Locks of the host: one holder, named to the others; free at once when it ends, however."""
 
 import os
+from pathlib import Path
 import subprocess
 import sys
 import threading
+from types import SimpleNamespace
 
 import pytest
 from waiting import wait_for
 
+from drive_can_bridge.process import locks
 from drive_can_bridge.process.locks import Held, holder, HostLock, take
 
 HOLDER = """
@@ -32,6 +35,24 @@ def elsewhere(*keys: str) -> subprocess.Popen[str]:
     assert process.stdout is not None
     assert process.stdout.readline() == 'taken\n'
     return process
+
+
+def test_who_did_not_run_for_a_while_looks_once_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The name of the holder comes a moment behind its lock."""
+    mine = HostLock(key('a'), 'drive_can_bridge')
+    table, now = Path(locks.TABLE).read_text(encoding='utf-8'), [0.0]
+    texts = iter(['', table])
+
+    def read(*_: object, **__: object) -> str:
+        now[0] += 60.0
+        return next(texts)
+    monkeypatch.setattr(locks, 'Path', lambda _: SimpleNamespace(read_text=read))
+    monkeypatch.setattr(locks, 'time', SimpleNamespace(
+        monotonic=lambda: now[0], sleep=lambda _: None))
+    found = holder(key('a'))
+    assert found is not None
+    assert found.process == os.getpid()
+    mine.release()
 
 
 def test_one_holder_in_a_process() -> None:
