@@ -195,7 +195,10 @@ def _sinks(args: Namespace, configuration: BridgeConfiguration, selection: Selec
     drives = [drive for drive in configuration.drives.values() if selection.names(drive.name)]
     if args.plot:       # refuses unknown names, so before a file is replaced
         picture, *wanted = args.plot
-        plotter = Plotter(configuration, wanted, drives)
+        try:
+            plotter = Plotter(configuration, wanted, drives)
+        except DriveCanError as error:
+            raise WrongUsage(error.sentence) from None
         sinks.append(plotter)
         endings.append(lambda: _draw(plotter, picture))
     if args.csv is not None:
