@@ -171,8 +171,9 @@ def _identity(backup: Backup, drive: Drive, clock: Clock) -> str:
     """Return the identity of a drive; a bridge that has just started is about to read it."""
     end = clock.now() + _PATIENCE
     while True:
+        late = clock.now() > end    # before it looks: it may not run for a while
         found = drive.identity()
-        if found or not (drive.facts.through and backup.head.identity) or clock.now() > end:
+        if found or late or not (drive.facts.through and backup.head.identity):
             return found
         clock.wait(clock.now() + _PATIENCE / 10.0)
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import errno
 from itertools import product
 import signal
+from types import SimpleNamespace
 
 from extent import some
 import pytest
@@ -12,11 +13,25 @@ from scripted_drive import (
     Fate, FILE, Killed, MODE, OTHER, restored, SAVE, ScriptedDrive, SETTINGS, STORE)
 
 from drive_can_bridge.backup.restore import PATIENCE, RestoreResult
+from drive_can_bridge.cli.restore import _identity
 from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.process.critical_sections import postponed
 
 #: mode, three settings, mode
 WRITES = range(1, 6)
+
+
+def test_an_identity_that_was_looked_for_once_is_looked_for_again() -> None:
+    """A process that did not run meanwhile has not waited for it."""
+    now, told = [0.0], iter(['', 'servo'])
+
+    def identity() -> str:
+        now[0] += 60.0
+        return next(told)
+    drive = SimpleNamespace(identity=identity, facts=SimpleNamespace(through='bridge'))
+    backup = SimpleNamespace(head=SimpleNamespace(identity='servo'))
+    clock = SimpleNamespace(now=lambda: now[0], wait=lambda until: None)
+    assert _identity(backup, drive, clock) == 'servo'   # type: ignore[arg-type]
 
 
 def test_as_it_should_be() -> None:
