@@ -150,11 +150,28 @@ class NodeSetUp:
 
     def _stand_still(self, reply: ObjectRead | Refused) -> Procedure[int]:
         """
-        Disable a drive that is found enabled, before anything else is touched.
+        Disable a drive that is found enabled, or that a SYNC may enable, before anything else.
 
         :param reply: its status word.
         :return: the last one.
         """
+        producer = self._producer
+        while True:
+            raw = yield from self._disable(reply)
+            self._disabled = producer is None or (
+                states.state_of(raw) not in states.ONE_WORD_FROM_ENABLED)
+            found = None if self._disabled or producer is None else (
+                yield from self._power_off(producer))
+            if found is None:
+                break
+            reply = found
+        self._rules.known_disabled()
+        if self._disabled:
+            self._session.duty.happened(Happened.STOPPED)
+        return raw
+
+    def _disable(self, reply: ObjectRead | Refused) -> Procedure[int]:
+        """Disable a drive that is found enabled; return the last status word."""
         looks, word, refusal = 0, -1, NOTHING
         until = self._channel.now + self._drive.control_timeout
         while True:
@@ -188,32 +205,30 @@ class NodeSetUp:
             looks += 1
             yield Transfer(pause=POLL_PERIOD)
             reply = yield from self._transfer(Transfer(states.STATUS_WORD))
-        self._found = NOTHING
-        self.moving = None
-        self._disabled = state not in states.ONE_WORD_FROM_ENABLED or (
-            yield from self._power_off())
-        self._rules.known_disabled()
-        if self._disabled:
-            self._session.duty.happened(Happened.STOPPED)
+        self._found, self.moving = NOTHING, None
         return raw
 
-    def _power_off(self) -> Procedure[bool]:
+    def _power_off(self, producer: SyncProducer) -> Procedure[ObjectRead | Refused | None]:
         """
         Write 0000h: a SYNC may put into effect a 000Fh that the drive still has in its buffers.
 
-        :return: it was taken, or is not needed; False: the drive has refused it for 0.5 s.
+        :return: its status word then; None: for 0.5 s it has not obeyed.
         """
-        producer = self._producer
-        if producer is None:
-            return True
         self._stopped_at = min(self._stopped_at, self._channel.now)
-        while refusal := (yield from self._put(
-                states.CONTROL_WORD, 0, states.DISABLE_VOLTAGE, 2)):
-            if producer.opened or self._channel.now >= self._stopped_at + STOP_TIME:
+        while True:
+            refusal = yield from self._put(states.CONTROL_WORD, 0, states.DISABLE_VOLTAGE, 2)
+            if not refusal:
+                reply = yield from self._transfer(Transfer(states.STATUS_WORD))
+                if isinstance(reply, Refused):
+                    return reply
+                state = states.state_of(reply.number(2))
+                if state not in states.ONE_WORD_FROM_ENABLED:
+                    return reply
+                refusal = sentences.still_in_state(state.value)
+            if producer.opened or self._channel.now + POLL_PERIOD >= self._stopped_at + STOP_TIME:
                 self.report_once(sentences.sync_may_start(refusal))
-                return False
+                return None
             yield Transfer(pause=POLL_PERIOD)
-        return True
 
     def _stop_blindly(self, attempts: int | None = None) -> Procedure[None]:
         """Stop a drive whose state is unknown, before SYNC begins."""

@@ -221,6 +221,27 @@ class TestBeforeTheFirst:
         assert ServoDrive.ENABLED not in became
         assert not [note for note in after.talk.events(Noted) if 'SYNC may start' in note.text]
 
+    def test_or_acknowledges_that_and_stays(self) -> None:
+        after, _ = self.died(ServoDrive.READY, 'verify')
+        after.drive.instead = {'2b406000': '6040600000000000'}
+        assert self.first(after) == pytest.approx(0.5, abs=0.03)
+        assert after.talk.events(Noted)[0].text == says('sync_may_start', refusal=says(
+            'still_in_state', state='ready to switch on'))
+
+    def test_or_is_enabled_meanwhile(self) -> None:
+        after, _ = self.died(ServoDrive.READY, 'verify')
+        drive, control, words = after.drive, after.drive._control, []
+
+        def obeys(word: int) -> None:
+            words.append(word)
+            control(word)
+            if len(words) == 1:
+                drive.becomes(drive.ENABLED)
+        drive._control = obeys      # type: ignore[method-assign]
+        self.first(after)
+        assert words[:3] == [0x0000, 0x0007, 0x0000]
+        assert after.session.online
+
     def test_or_never(self) -> None:
         after, _ = self.died(ServoDrive.READY, 'verify')
         after.drive.fixed = {(0x6040, 0): 0x08000022}
