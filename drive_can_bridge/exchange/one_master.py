@@ -14,7 +14,7 @@ from drive_can_bridge.core import bus_sentences
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.process.locks import Held, holder, HostLock, take
-from drive_can_bridge.process.presence import BRIDGE, BESIDES
+from drive_can_bridge.process.presence import BESIDES, BRIDGE
 from drive_can_bridge.transport.bus_identity import identity_of
 
 #: what to do for commands that have only the direct way
