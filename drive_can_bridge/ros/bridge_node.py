@@ -73,6 +73,8 @@ _OURS_ALONE = ('diagnostics_period', 'autostart')
 NODE_NAME = 'drive_can_bridge'
 #: s until it is looked again whether the callers of a drive that leaves have their answers
 DISMISS_PAUSE = 0.005
+#: s that these may take at the end of the process
+LAST_ANSWERS = 0.5
 
 SUCCESS = TransitionCallbackReturn.SUCCESS
 FAILURE = TransitionCallbackReturn.FAILURE
@@ -476,6 +478,9 @@ class BridgeNode(LifecycleNode):
     def close(self) -> None:
         """Close what is open. The executor must have stopped."""
         self._clean_up()
+        until = self._steady.now() + LAST_ANSWERS
+        while self._leaving and self._steady.now() < until:
+            self._dismiss()
         while self._leaving:
             self._leaving.pop().destroy()
         for thread in self._control_threads.values():

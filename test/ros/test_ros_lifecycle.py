@@ -362,3 +362,23 @@ def test_the_end_stops_drives_whatever_a_transition_is_at(bridge: StartBridge, c
         recorder.catch_up()
         assert [words[0] for words in recorder.cycles()[-3:]] == [0, 0, 0]
         assert one.node.drives['conveyor'].session.stopped
+
+
+def test_at_the_end_no_drive_leaves_before_its_callers_have_their_answers(
+        bridge: StartBridge, monkeypatch: pytest.MonkeyPatch) -> None:
+    """But one whose answer cannot be sent does not keep the process."""
+    waits = {'conveyor': 5, 'lift': 1_000_000}
+    left: dict[str, int] = {}
+
+    def answer_all(drive: DriveNode) -> bool:
+        waits[drive.name] -= 1
+        return waits[drive.name] < 0
+
+    def destroy(drive: DriveNode) -> None:
+        left[drive.name] = waits[drive.name]
+        really(drive)
+    really = DriveNode.destroy
+    monkeypatch.setattr(DriveNode, 'answer_all', answer_all)
+    monkeypatch.setattr(DriveNode, 'destroy', destroy)
+    bridge(parameters(conveyor=CONVEYOR, lift=LIFT)).close()
+    assert left['conveyor'] < 0 < left['lift']
