@@ -399,6 +399,9 @@ set_up_unanswered = Text(
     'no answer to SDO: drive silent, wrong station or bit rate',
     kinds=(Absence.SILENT,),
     do='look at power, cable, node-ID and bit rate')
+object_unanswered = Text(
+    'no answer to SDO of {what}, others are answered',
+    do='see whether the drive has that object: one that it lacks has to be refused (06020000h)')
 found_enabled = Text(
     'found in state {state}: it is disabled before anything else',
     do='find out what has enabled it')

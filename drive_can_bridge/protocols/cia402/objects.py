@@ -32,7 +32,7 @@ class SetUpOutcome:
     """
     The end of the set-up.
 
-    :param text: what differs, or how it runs on.
+    :param text: what differs, how it runs on, or what is not answered.
     :param status: the last status word, where it is ready.
     :param remedy: says what to do about what differs.
     """
@@ -72,7 +72,8 @@ class ObjectAccess:
         """Do one transfer. :raises SetUpEnd: nobody answers."""
         reply = yield ask
         if isinstance(reply, Silence):
-            raise SetUpEnd(SetUpOutcome(SetUpState.SILENT))
+            raise SetUpEnd(SetUpOutcome(SetUpState.SILENT, sentences.object_unanswered(
+                at_object(ask.index, ask.subindex))))
         self.abort = reply.code if isinstance(reply, Refused) else None
         return reply
 

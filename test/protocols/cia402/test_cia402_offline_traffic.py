@@ -55,6 +55,15 @@ class TestHeard:
         axis.live(5.0)      # and forgotten when it does not any more
         assert axis.session.offline_advice.code == 'set_up_unanswered'
 
+    def test_one_that_passes_over_what_it_lacks(self) -> None:
+        axis = Axis()
+        takes = axis.drive.takes
+        axis.drive.takes = (        # type: ignore[method-assign]
+            lambda sent: [] if sent.data[1:4] == b'\x5B\x60\0' else takes(sent))
+        axis.start()
+        axis.live(3.0)
+        assert axis.session.offline_advice == says('object_unanswered', what='605Bh.00h')
+
     def test_what_came_before_it_was_lost_does_not_count(self) -> None:
         axis = Deaf().online()
         axis.mute = True
