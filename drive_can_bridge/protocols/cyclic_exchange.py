@@ -346,7 +346,7 @@ class CyclicExchange(Generic[TelegramT]):
         self._ending, self.cycles_left = Ending.MORE, MORE_CYCLES
         if self._session.configuration.period <= LAST_ANSWER:   # late answers have come by now
             for each in self.audience:      # or are held; the last cycle is to show the stop
-                each.book.give_up(now)
+                each.book.give_up(MORE_CYCLES - 1)
 
     def wait_out(self, now: float) -> None:
         """Come to the end of a stop that only waits for an answer, if that came."""

@@ -138,10 +138,9 @@ class ExchangeBook:
     """
 
     __slots__ = (
-        '_asked', '_came', '_given_up', '_heard_at', '_horizon', '_kept', '_late', '_limit',
-        '_period', '_ran_at', '_runs', '_since', '_statistics', '_steady', '_too_many_at',
-        'answered_at', 'awaiting', 'began_at', 'missed_in_row', 'overdue', 'stale', 'stop_shown',
-        'timer')
+        '_asked', '_came', '_given_up', '_heard_at', '_horizon', '_kept', '_limit', '_period',
+        '_ran_at', '_runs', '_since', '_statistics', '_steady', '_too_many_at', 'answered_at',
+        'awaiting', 'began_at', 'missed_in_row', 'overdue', 'stale', 'stop_shown', 'timer')
 
     def __init__(self, drive: DriveConfiguration, statistics: DriveStatistics,
                  timer: CycleTimer | None = None) -> None:
@@ -156,7 +155,6 @@ class ExchangeBook:
         self._came = 0              # answers since the last cycle
         self._steady = False        # the one before was answered once
         self._heard_at = -math.inf
-        self._late = 0.0            # age of the cycle that the last answer was to
         self._ran_at = -math.inf        # the last running cycle was sent then
         self._too_many_at = -math.inf   # an answer came that no cycle was left for
         self._period = drive.period
@@ -216,7 +214,7 @@ class ExchangeBook:
         if of:
             at, neutral = of.popleft()
             self._came += 1
-            self._heard_at, self._late = received_at, received_at - at
+            self._heard_at = received_at
             self.stop_shown = self.stop_shown or (
                 neutral == self._runs and self._counts(received_at))
             self.overdue = max(0.0, received_at - at - self._period)
@@ -255,17 +253,17 @@ class ExchangeBook:
         self._asked.clear()
         self._given_up.clear()
 
-    def give_up(self, now: float) -> None:
+    def give_up(self, silent: int) -> None:
         """
         Give up the answers to cycles from before a stop.
 
-        Not those to cycles that were sent since the drive has been silent, nor, where the last
-        answer was late, those that are no later.
+        :param silent: but to so many that were sent since the drive has been silent.
         """
         asked = self._asked
-        for at in [at for at, neutral in asked if neutral != self._runs]:
-            if at <= self._heard_at and now - at >= self._late:
-                self._given_up.append(asked.popleft())
+        before = [at for at, neutral in asked if neutral != self._runs]
+        kept = min(silent, sum(at > self._heard_at for at in before))
+        for _ in range(len(before) - kept):
+            self._given_up.append(asked.popleft())
 
     def _forget_older(self, now: float) -> None:
         asked, given_up = self._asked, self._given_up
