@@ -549,7 +549,7 @@ class World:
         self.reconfigures(0.2, 0.02)
 
     def _patient(self) -> None:
-        self.reconfigures(COMMAND_TIMEOUT, 0.3)
+        self.reconfigures(COMMAND_TIMEOUT, 0.2)
 
     def reconfigures(self, command_timeout: float, parameter_timeout: float) -> None:
         """Have a user change what may change while drives run."""
