@@ -27,8 +27,11 @@ from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.core.text import UNNAMED_NODE, value_text
 from drive_can_bridge.ros.advice import how_to_enable
 from drive_can_bridge.ros.joint_reader import JointMessage, JointReader, QUANTITIES
-from drive_can_bridge.ros.polled_topics import PolledTopics, Warn
+from drive_can_bridge.ros.polled_topics import COUNT_PERIOD, PolledTopics, Warn
 from drive_can_bridge.ros.values import TOPIC_TYPES
+
+#: drives of neighbouring stations count their publishers in so many different cycles
+SHIFTS = 5
 
 
 class _Target(NamedTuple):
@@ -58,7 +61,8 @@ class CommandIntake:
         self._armed = armed
         self._told: set[str] = set()
         self._joint = joint = drive.joint
-        self._topics = PolledTopics(node, clock, warn, self.refuse)
+        self._topics = PolledTopics(node, clock, warn, self.refuse,
+                                    shift=drive.station % SHIFTS * COUNT_PERIOD / SHIFTS)
         self._joint_targets: dict[str, _Target] = {}    # by quantity of the joint
         try:
             for index, setpoint in enumerate(session.setpoints.items):

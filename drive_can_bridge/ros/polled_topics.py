@@ -178,11 +178,14 @@ class PolledTopics:
 
     :param warn: logs (topic of the warning, text); limits repetitions itself.
     :param refuse: the same for a command that is refused.
+    :param shift: s, less than ``COUNT_PERIOD``, by which its counts come later than others': of
+        drives that are served together the last would have to wait for them all.
     """
 
     def __init__(self, node: Node, clock: Clock, warn: Warn,
-                 refuse: Callable[[str, str], None]) -> None:
+                 refuse: Callable[[str, str], None], shift: float = 0.0) -> None:
         self._clock = clock
+        self._shift = shift
         self._node = node
         self._warn = warn
         self._refuse = refuse
@@ -246,7 +249,7 @@ class PolledTopics:
                 for topic in self._published:
                     topic.take(now, look)
                 return
-            self._count_at = now + COUNT_PERIOD
+            self._count_at = max(self._count_at + COUNT_PERIOD, now + self._shift)
             for topic in self._topics:  # some may have come from a publisher that has left by now
                 topic.take(now, look)
             self._published = [topic for topic in self._topics

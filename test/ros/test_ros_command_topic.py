@@ -3,9 +3,10 @@
 
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 import math
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from rclpy.qos import HistoryPolicy, QoSProfile
@@ -15,7 +16,7 @@ from std_msgs.msg import Bool, Float64, Int64
 
 from drive_can_bridge.core.command_age import Age
 from drive_can_bridge.ros import polled_topics
-from drive_can_bridge.ros.polled_topics import CommandTopic
+from drive_can_bridge.ros.polled_topics import COUNT_PERIOD, CommandTopic, PolledTopics
 from drive_can_bridge.ros.rcl import incoming
 from drive_can_bridge.ros.rcl.incoming import by_hand, Incoming, subscribe
 
@@ -292,3 +293,31 @@ def test_a_flood_is_taken_in_bounds() -> None:
     assert taken.topic.discard((20_000_000 * MS, 0)) == 5
     taken.subscription.endless = False
     assert taken.topic.discard((20_000_000 * MS, 0)) == 0
+
+
+def test_drives_of_a_turn_count_their_publishers_in_different_cycles() -> None:
+    now = 100.0
+    clock = SimpleNamespace(now=lambda: now, stamp=lambda: round(1e9 * now))
+    counted: dict[int, list[int]] = {}
+
+    def count(station: int) -> None:
+        counted.setdefault(cycle, []).append(station)
+    drives = []
+    for station in range(5):
+        polled = PolledTopics(
+            cast('Any', None), cast('Any', clock), cast('Any', None), cast('Any', None),
+            shift=station * COUNT_PERIOD / 5)
+        topic = Taken(Float64).topic
+        topic.incoming = cast('Any', SimpleNamespace(
+            publishers=partial(count, station), look=lambda: None, take=lambda: None))
+        polled._topics.append(topic)
+        drives.append(polled)
+    for cycle in range(41):
+        now = 100.0 + 0.01 * cycle + 0.001
+        for polled in drives:
+            polled.take(now)
+    assert len(counted.pop(0)) == 5     # a command may wait already
+    assert all(len(together) == 1 for cycle, together in counted.items() if cycle > 5)
+    # and each after COUNT_PERIOD, as ever
+    assert all([cycle for cycle, together in counted.items() if cycle > 5 and station in together]
+               == list(range(6 + (station + 4) % 5, 41, 5)) for station in range(5))
