@@ -16,7 +16,7 @@ from std_msgs.msg import Bool, Float64, Int64
 
 from drive_can_bridge.core.command_age import Age
 from drive_can_bridge.ros import polled_topics
-from drive_can_bridge.ros.polled_topics import COUNT_PERIOD, CommandTopic, PolledTopics
+from drive_can_bridge.ros.polled_topics import CommandTopic, COUNT_PERIOD, PolledTopics
 from drive_can_bridge.ros.rcl import incoming
 from drive_can_bridge.ros.rcl.incoming import by_hand, Incoming, subscribe
 
