@@ -20,6 +20,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from waiting import clock
 
+from drive_can_bridge.clock import SteadyClock
 from drive_can_bridge.ros.stamps import Stamps
 
 
@@ -90,9 +91,10 @@ def test_a_sample_has_one_stamp_when_the_clock_is_set_behind_it(
 def test_a_time_that_no_stamp_holds_is_0_and_told_once(monkeypatch: pytest.MonkeyPatch,
                                                        seconds: int) -> None:
     told: list[str] = []
-    stamps = Stamps(Clock, told.append, REAL)
-    monkeypatch.setattr(time, 'time_ns', lambda: seconds * 10 ** 9)
-    moment = REAL.now()
+    machine = SteadyClock()
+    stamps = Stamps(Clock, told.append, machine)
+    monkeypatch.setattr(machine, 'stamp', lambda: seconds * 10 ** 9)
+    moment = machine.now()
     assert [stamps.at(moment + step) for step in (0.0, -0.1, 1.0)] == [(0, 0)] * 3
     assert stamps.now() == Time()
     assert len(told) == 1 and 'system clock' in told[0]
