@@ -16,6 +16,7 @@ from typing import Any
 
 import can
 
+from drive_can_bridge.compiled import mypyc_attr
 from drive_can_bridge.core.frame import Frame
 
 # linux/can.h: bits beside an identifier
@@ -43,6 +44,7 @@ _DROPS = 8
 FRAME_CHARGE = 960
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class RawSocket:
     """
     The socket of one SocketCAN interface.

@@ -30,6 +30,7 @@ from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, Trans
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.transport import port as port_module, serial_writer
 from drive_can_bridge.transport.port import open_port, Port
+from drive_can_bridge.transport.raw_socket import RawSocket
 from drive_can_bridge.transport.serial_writer import AdapterAnswers, Below
 
 FRAME = Frame(0x003FFFF0, bytes(8), True)
@@ -359,13 +360,17 @@ def test_anything_else_is(bus: FakeBus, failure: Exception) -> None:
         port.receive(0.0)
 
 
-class FakeSocket:
+class FakeSocket(RawSocket):
     """A socket below the bus that is full, or not."""
 
-    def __init__(self) -> None:
+    def __init__(self) -> None:     # there is none
         self.room = True
-        self.overflowed_frames = 0
+        self.overflowed = 0
         self.waited: list[float] = []
+
+    @property
+    def overflowed_frames(self) -> int:
+        return self.overflowed
 
     def has_room(self, timeout: float) -> bool:
         self.waited.append(timeout)
@@ -375,14 +380,14 @@ class FakeSocket:
 def test_socket_without_room_gets_nothing(bus: FakeBus) -> None:
     port = Port(bus, REAL)
     assert port.has_room is None
-    port._socket = socket = FakeSocket()  # type: ignore[assignment]
+    port._socket = socket = FakeSocket()
     assert port.has_room
     socket.room = False
     with pytest.raises(TransportError, match='^send: transmit queue full$'):
         port.send(FRAME, 0.0125)
     assert bus.sent == []
     assert socket.waited[-1] == 0.0125
-    socket.overflowed_frames = 7
+    socket.overflowed = 7
     assert port.counts.overflowed == 7
 
 

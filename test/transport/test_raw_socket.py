@@ -13,7 +13,7 @@ import os
 import socket
 import struct
 import time
-from typing import Any
+from typing import Any, NoReturn
 
 import can
 from can.interfaces.socketcan.socketcan import SocketcanBus
@@ -24,6 +24,7 @@ from waiting import DEADLINE
 from drive_can_bridge.core.errors import BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.transport.port import Port
+from drive_can_bridge.transport.raw_socket import RawSocket
 
 # linux/can.h on a machine with little-endian numbers: identifier and flags, length, padding, data
 DATA_11 = bytes.fromhex('85010000' '06000000' '370221430000 0000')
@@ -189,13 +190,13 @@ def test_full_queue(pair: Callable[..., Pair]) -> None:
     it.port.send(Frame(0x185, bytes(8), False), 0.0)
 
 
-class Refusing:
+class Refusing(RawSocket):
     """A socket below that has an error to tell."""
 
-    def __init__(self, number: int) -> None:
+    def __init__(self, number: int) -> None:    # there is none
         self.error = OSError(number, os.strerror(number))
 
-    def receive(self, timeout: float) -> None:
+    def receive(self, timeout: float) -> NoReturn:
         raise self.error
 
     def send(self, frame: Frame, timeout: float) -> bool:
@@ -204,7 +205,7 @@ class Refusing:
 
 def test_no_buffer_is_a_full_queue(pair: Callable[..., Pair]) -> None:
     port = pair().port
-    port._direct = Refusing(errno.ENOBUFS)  # type: ignore[assignment]
+    port._direct = Refusing(errno.ENOBUFS)
     with pytest.raises(TransportError, match='^send: transmit queue full$'):
         port.send(Frame(0x185, b'', False), 0.0)
 
@@ -212,7 +213,7 @@ def test_no_buffer_is_a_full_queue(pair: Callable[..., Pair]) -> None:
 @pytest.mark.parametrize('number', [errno.ENETDOWN, errno.ENODEV, errno.ENXIO])
 def test_lost(pair: Callable[..., Pair], number: int) -> None:
     port = pair().port
-    port._direct = Refusing(number)     # type: ignore[assignment]
+    port._direct = Refusing(number)
     with pytest.raises(BusUnavailable, match=f'^send: .*{os.strerror(number)}'):
         port.send(Frame(0x185, b'', False), 0.0)
     with pytest.raises(BusUnavailable, match=f'^receive: .*{os.strerror(number)}'):
