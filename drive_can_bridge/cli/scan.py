@@ -31,7 +31,7 @@ from drive_can_bridge.core.errors import (
     BusUnavailable, ConfigurationError, DriveCanError, TransportError)
 from drive_can_bridge.core.frame import bits_of_exchange, Frame
 from drive_can_bridge.core.messages import NOTHING, Sentence
-from drive_can_bridge.core.text import column_lines
+from drive_can_bridge.core.text import column_lines, counted
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import ScanEntry
@@ -449,7 +449,7 @@ def _tell_left_out(args: Namespace, scan: BusScan, asked: Sequence[str]) -> None
     """Print the bit rate, and what was not asked, and how to ask it."""
     left = [name for name in FAMILIES if name not in asked]
     told = f'{args.bitrate} bit/s, ' if args.bitrate else ''
-    told += f'{scan.frames} frame{"s" * (scan.frames != 1)} heard'
+    told += f'{counted(scan.frames, "frame")} heard'
     if args.passive:
         told += '; nothing was asked: --passive'
     elif left and not scan.master and not scan.nodes and not scan.trouble:
